@@ -1,0 +1,52 @@
+"""Sunsplit's core: from an HDRI to suns, a residual map and an account. No bpy in here.
+
+from sunsplit.core import ConversionSettings, convert, load, save
+
+conversion = convert(load("sky.hdr"), ConversionSettings(lights=4))
+save(conversion, "out", preview=True)
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .conversion import Conversion, convert
+    from .environment import EnvironmentMap
+    from .errors import SunsplitError
+    from .files.conversion import account_of_files, save
+    from .files.maps import load
+    from .settings import ConversionSettings
+
+_HOMES = {
+    "Conversion": "conversion",
+    "ConversionSettings": "settings",
+    "EnvironmentMap": "environment",
+    "SunsplitError": "errors",
+    "account_of_files": "files.conversion",
+    "convert": "conversion",
+    "load": "files.maps",
+    "save": "files.conversion",
+}
+
+__all__ = [
+    "Conversion",
+    "ConversionSettings",
+    "EnvironmentMap",
+    "SunsplitError",
+    "account_of_files",
+    "convert",
+    "load",
+    "save",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used: enabling the add-on must not load scipy."""
+    from importlib import import_module
+
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    globals()[name] = value
+    return value

@@ -1,0 +1,233 @@
+"""The command line: `sunsplit convert` and `sunsplit info`. Needs no Blender.
+
+Exit status: 0 done, 1 the input cannot be used, 2 wrong usage, 130 cancelled.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from math import pi
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .errors import SunsplitError
+from .progress import Progress, terminal_progress
+
+if TYPE_CHECKING:  # imported where they are used: `--help` must not wait for scipy
+    from .conversion import Conversion
+    from .environment import EnvironmentMap
+    from .files.conversion import WrittenFiles
+
+CANCELLED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one verb and return the exit status."""
+    options = _parser().parse_args(arguments)
+    try:
+        return options.run(options)
+    except SunsplitError as error:
+        print(f"sunsplit: {error}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        # The reader of our output (head, less) has left; the files are written.
+        sys.stdout = None  # type: ignore[assignment]
+        return 0
+    except KeyboardInterrupt:
+        print("sunsplit: cancelled, nothing was written.", file=sys.stderr)
+        return CANCELLED
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="sunsplit", description="Split an HDRI into sun lamps and a calm residual map."
+    )
+    verbs = parser.add_subparsers(required=True, metavar="VERB")
+    convert = verbs.add_parser(
+        "convert",
+        help="write suns and residual map of an HDRI",
+        description="Write <name>.lights.json and <name>.residual.exr (and a preview).",
+    )
+    _add_map(convert)
+    convert.add_argument(
+        "-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: here"
+    )
+    convert.add_argument(
+        "--lights", type=_count, default=16, metavar="N", help="at most N suns (default: 16)"
+    )
+    convert.add_argument(
+        "--share",
+        type=_share,
+        default=None,
+        metavar="X",
+        help="part of all light in the bright region, above 0 up to 1 (1: no residual), "
+        "or auto (default): whole peaks with their halo",
+    )
+    convert.add_argument(
+        "--strata", type=_strata, default=2, metavar="N", help="strata of luminance (default: 2)"
+    )
+    convert.add_argument("--residual", choices=("map", "none"), default="map")
+    convert.add_argument("--preview", action="store_true", help="also write <name>.preview.png")
+    convert.add_argument("--json", action="store_true", help="print the result as JSON")
+    convert.set_defaults(run=run_convert)
+    info = verbs.add_parser("info", help="say what an HDRI holds, write nothing")
+    _add_map(info)
+    info.add_argument("--json", action="store_true", help="print the result as JSON")
+    info.set_defaults(run=run_info)
+    return parser
+
+
+def _add_map(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("map", type=Path, metavar="HDRI", help="an equirectangular .exr or .hdr")
+    verb.add_argument(
+        "--allow-ldr", action="store_true", help="take 8 and 16 bit images too, as sRGB"
+    )
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number from 1 up")
+    return int(text)
+
+
+def _strata(text: str) -> int:
+    if not text.isdecimal() or int(text) < 2 or int(text) % 2:
+        raise argparse.ArgumentTypeError(f"{text!r} is not an even number from 2 up")
+    return int(text)
+
+
+def _share(text: str) -> float | None:
+    if text == "auto":
+        return None
+    try:
+        share = float(text)
+    except ValueError:
+        share = 0.0
+    if not 0 < share <= 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor above 0 up to 1")
+    return share
+
+
+def run_convert(options: argparse.Namespace) -> int:
+    from .conversion import convert
+    from .files.conversion import save
+    from .files.maps import load
+    from .settings import ConversionSettings
+
+    settings = ConversionSettings(
+        lights=options.lights,
+        share=options.share,
+        strata=options.strata,
+        residual=options.residual if options.share != 1 else "none",
+    )
+    with terminal_progress() as progress:
+        progress("reading", 0.0)
+        environment = load(options.map, options.allow_ldr)
+        conversion = convert(environment, settings, _within(progress, 0.3, 0.8))
+        progress("writing", 0.8)
+        files = save(conversion, options.output, options.preview)
+    if options.json:
+        _print_json(conversion, files)
+    else:
+        _print_conversion(conversion, files)
+    return 0
+
+
+def run_info(options: argparse.Namespace) -> int:
+    from .conversion import convert
+    from .files.conversion import describe
+    from .files.maps import load
+    from .settings import ConversionSettings
+
+    with terminal_progress() as progress:
+        progress("reading", 0.0)
+        environment = load(options.map, options.allow_ldr)
+        conversion = convert(
+            environment, ConversionSettings(residual="none"), _within(progress, 0.3, 1.0)
+        )
+    if options.json:
+        print(json.dumps(describe(conversion)))
+        return 0
+    _print_map(environment)
+    print(f"brightest pixel {_contrast(conversion):,.0f} times the mean luminance")
+    _print_suns(conversion)
+    return 0
+
+
+def _within(progress: Progress, start: float, end: float) -> Progress:
+    """A listener for a part of the whole work."""
+    return lambda stage, fraction: progress(stage, start + (end - start) * fraction)
+
+
+def _contrast(conversion: Conversion) -> float:
+    from .environment import LUMINANCE_WEIGHTS
+
+    mean = conversion.account.source @ LUMINANCE_WEIGHTS / (4 * pi)
+    return float(conversion.strata.luminance.max() / mean)
+
+
+def _print_map(environment: EnvironmentMap) -> None:
+    print(f"{environment.file}: {environment.width} x {environment.height}")
+    if environment.repairs.pixels:
+        added = environment.repaired_share
+        print(f"repaired pixels: {environment.repairs} (light changed by {added:.3%})")
+    for warning in environment.warnings:
+        print(f"warning: {warning}")
+
+
+def _print_suns(conversion: Conversion) -> None:
+    import numpy as np
+
+    from .environment import LUMINANCE_WEIGHTS
+
+    all_light = conversion.account.source @ LUMINANCE_WEIGHTS
+    noun = "sun" if len(conversion.suns) == 1 else "suns"
+    print(f"{len(conversion.suns)} {noun} with {conversion.account.share:.1%} of all light")
+    for rank, sun in enumerate(conversion.suns, start=1):
+        part = sun.scalar_irradiance @ LUMINANCE_WEIGHTS / all_light
+        x, y, z = sun.to_light
+        elevation = np.degrees(np.arctan2(z, np.hypot(x, y)))
+        azimuth = np.degrees(np.arctan2(y, x)) % 360
+        print(
+            f"  {rank:3d}  {part:7.2%}  azimuth {azimuth:6.2f}°  elevation {elevation:+6.2f}°"
+            f"  {np.degrees(sun.angular_diameter):6.2f}° wide"
+        )
+    for note in conversion.notes:
+        print(note)
+
+
+def _print_conversion(conversion: Conversion, files: WrittenFiles) -> None:
+    _print_map(conversion.environment)
+    _print_suns(conversion)
+    computed = conversion.account.relative_error.max()
+    line = f"account: suns + residual = source within {computed:.1e}"
+    if files.residual is None:
+        print(f"no residual map: {1 - conversion.account.share:.1%} of all light is left out")
+    else:
+        print(f"{line}; read again from the files {_reread(files):.1e}")
+    for path in (files.lights, files.residual, files.preview):
+        if path:
+            print(f"wrote {path}")
+
+
+def _reread(files: WrittenFiles) -> float:
+    from .files.conversion import account_of_files
+
+    return float(account_of_files(files.lights).relative_error.max())
+
+
+def _print_json(conversion: Conversion, files: WrittenFiles) -> None:
+    from .files.conversion import describe
+
+    paths = {
+        kind: str(path) if path else None
+        for kind, path in (
+            ("lights", files.lights),
+            ("residual", files.residual),
+            ("preview", files.preview),
+        )
+    }
+    print(json.dumps(describe(conversion) | {"files": paths}))

@@ -1,0 +1,134 @@
+"""The pipeline: an environment map goes in; suns, a residual map and an account come out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import sphere
+from .account import Account, settle
+from .cells import Cell
+from .environment import EnvironmentMap
+from .placement.groups import WIDEST_DISC, cut_misfits
+from .progress import Progress, silent
+from .residual import surroundings
+from .settings import ConversionSettings
+from .strata import Strata, stratify
+from .suns import Sun, disc_sun
+
+SMALLEST_SUN = 0.005
+"""Part of all light below which the automatic choice makes no sun: nobody would see its shadow."""
+
+
+@dataclass(frozen=True, eq=False)
+class Conversion:
+    """What became of a map.
+
+    suns: brightest first. residual: float32 (height, width, 3), or None when not asked for.
+    notes: plain sentences for the user.
+    """
+
+    environment: EnvironmentMap
+    settings: ConversionSettings
+    strata: Strata
+    suns: tuple[Sun, ...]
+    residual: NDArray[np.float32] | None
+    account: Account
+    notes: tuple[str, ...]
+
+
+def convert(
+    environment: EnvironmentMap,
+    settings: ConversionSettings | None = None,
+    progress: Progress = silent,
+) -> Conversion:
+    """Split a map into suns (region A) and a residual map (region B)."""
+    settings = settings or ConversionSettings()
+    progress("strata", 0.0)
+    strata = stratify(environment, settings.share, settings.strata)
+    progress("groups", 0.3)
+    groups = bright_groups(environment, strata)
+    progress("suns", 0.5)
+    cells, notes = choose_cells(groups, environment, strata, settings)
+    suns = tuple(disc_sun(cell, _stratum(cell, strata)) for cell in cells)
+    progress("residual", 0.7)
+    residual = without(environment, cells) if settings.residual == "map" else None
+    progress("account", 0.9)
+    account = settle(environment.radiance, suns, residual)
+    progress("done", 1.0)
+    return Conversion(environment, settings, strata, suns, residual, account, tuple(notes))
+
+
+def bright_groups(environment: EnvironmentMap, strata: Strata) -> list[Cell]:
+    """What each connected group of region A shines above its surroundings."""
+    height, width = environment.height, environment.width
+    region = strata.region_a
+    labels, count = sphere.connected_groups(region)
+    pixels = np.flatnonzero(labels)
+    pixels = pixels[np.argsort(labels.ravel()[pixels], kind="stable")]
+    ends = np.cumsum(np.bincount(labels.ravel()[pixels], minlength=count + 1)[1:])
+    solid = sphere.row_solid_angles(width, height)
+    flat = environment.radiance.reshape(-1, 3)
+    groups = []
+    for group in np.split(pixels, ends[:-1]) if count else []:
+        beneath = surroundings(environment.radiance, region, group)
+        # In float64 from the float32 that will be stored: the account then closes by itself.
+        excess = flat[group].astype(np.float64) - beneath
+        groups.append(Cell.of(group, excess * solid[group // width, None], width, height))
+    return [group for group in groups if group.total > 0]
+
+
+def choose_cells(
+    groups: list[Cell],
+    environment: EnvironmentMap,
+    strata: Strata,
+    settings: ConversionSettings,
+) -> tuple[list[Cell], list[str]]:
+    """The cells that become suns, brightest first, and what the user should know of the rest."""
+    solid = sphere.row_solid_angles(environment.width, environment.height)
+    all_light = float(strata.luminance.sum(axis=1) @ solid)
+    groups = sorted(groups, key=lambda group: -group.total)
+    if settings.share is not None:
+        # A share that the user has set is kept: cuts may not push light out of the suns.
+        cells = cut_misfits(groups[: settings.lights], settings.lights, all_light)
+        return cells, _left_out(groups[settings.lights :], _limit(settings), all_light)
+    seen = [group for group in groups if group.total >= SMALLEST_SUN * all_light]
+    notes = _left_out(groups[len(seen) :], f"each below {SMALLEST_SUN:.1%}", all_light)
+    if not groups:
+        notes.append("No pixel is much brighter than the rest: the map needs no sun.")
+    cells = cut_misfits(seen, settings.lights + len(seen), all_light)
+    wide = [cell for cell in cells if cell.angular_diameter > WIDEST_DISC]
+    cells = [cell for cell in cells if cell.angular_diameter <= WIDEST_DISC]
+    notes += _left_out(wide, "too wide for a lamp", all_light)
+    notes += _left_out(cells[settings.lights :], _limit(settings), all_light)
+    return cells[: settings.lights], notes
+
+
+def _limit(settings: ConversionSettings) -> str:
+    return f"beyond the limit of {settings.lights} lights"
+
+
+def _left_out(groups: list[Cell], why: str, all_light: float) -> list[str]:
+    if not groups:
+        return []
+    part = sum(group.total for group in groups) / all_light
+    peaks = "1 bright spot" if len(groups) == 1 else f"{len(groups)} bright spots"
+    return [f"{peaks} with {part:.2%} of all light stay in the residual: {why}."]
+
+
+def without(environment: EnvironmentMap, cells: list[Cell]) -> NDArray[np.float32]:
+    """The map less the light of these cells, float32 (height, width, 3)."""
+    solid = sphere.row_solid_angles(environment.width, environment.height)
+    residual = environment.radiance.copy()
+    flat = residual.reshape(-1, 3)
+    for cell in cells:
+        rows = cell.pixels // environment.width
+        flat[cell.pixels] = flat[cell.pixels] - cell.flux / solid[rows, None]
+    np.maximum(flat, 0, out=flat)
+    return residual
+
+
+def _stratum(cell: Cell, strata: Strata) -> int:
+    return strata.stratum(float(strata.luminance.ravel()[cell.pixels].max()))

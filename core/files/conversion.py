@@ -1,0 +1,91 @@
+"""A whole conversion as files: written together, and added up again from what was written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..account import Account
+from ..conversion import Conversion
+from ..environment import scalar_irradiance
+from ..errors import UnusableInput
+from . import exr, lights_json
+from .atomic import written_together
+from .preview import draw_preview
+
+
+@dataclass(frozen=True)
+class WrittenFiles:
+    """Where a conversion lies on disk; None for what was not asked for."""
+
+    lights: Path
+    residual: Path | None
+    preview: Path | None
+
+
+def save(conversion: Conversion, folder: str | Path, preview: bool = False) -> WrittenFiles:
+    """Write `<name>.lights.json`, `.residual.exr` and, if asked for, `.preview.png`.
+
+    All of them appear, or none and the older ones stay. Raises CannotWrite.
+    """
+    folder = Path(folder)
+    stem = conversion.environment.name
+    names = {"lights": f"{stem}.lights.json"}
+    if conversion.residual is not None:
+        names["residual"] = f"{stem}.residual.exr"
+    if preview:
+        names["preview"] = f"{stem}.preview.png"
+    with written_together(folder, list(names.values())) as drafts:
+        draft = dict(zip(names, drafts, strict=True))
+        lights_json.write(draft["lights"], describe(conversion))
+        if conversion.residual is not None:
+            exr.write(draft["residual"], conversion.residual)
+        if preview:
+            draw_preview(conversion).save(draft["preview"])
+    paths = {kind: folder / name for kind, name in names.items()}
+    return WrittenFiles(paths["lights"], paths.get("residual"), paths.get("preview"))
+
+
+def describe(conversion: Conversion) -> dict[str, Any]:
+    """The document of `<name>.lights.json`."""
+    environment, account = conversion.environment, conversion.account
+    residual = None
+    if conversion.residual is not None:
+        height, width = conversion.residual.shape[:2]
+        name = f"{environment.name}.residual.exr"
+        residual = {"file": name, "kind": "map", "width": width, "height": height}
+    settings = conversion.settings.as_dict() | {
+        "share": conversion.strata.share,
+        "threshold": conversion.strata.threshold,
+    }
+    return {
+        "source": {
+            "file": environment.file,
+            "width": environment.width,
+            "height": environment.height,
+            "sha256": environment.sha256,
+            "repaired_pixels": environment.repairs.pixels,
+        },
+        "settings": settings,
+        "suns": [lights_json.sun_as_dict(sun) for sun in conversion.suns],
+        "residual": residual,
+        "account": lights_json.account_as_dict(account),
+        "notes": list(conversion.notes),
+    }
+
+
+def account_of_files(lights: str | Path) -> Account:
+    """The account added up anew from the files: suns from the JSON, pixels from the EXR."""
+    lights = Path(lights)
+    document, suns, stated = lights_json.read(lights)
+    residual = np.zeros(3)
+    if document["residual"]:
+        file = lights.parent / document["residual"]["file"]
+        if not file.exists():
+            raise UnusableInput(f"{file} is missing: convert the map again.")
+        residual = scalar_irradiance(exr.read(file)[0].astype(np.float32))
+    given = np.sum([sun.scalar_irradiance for sun in suns], axis=0) if suns else np.zeros(3)
+    return Account(stated.source, given, residual)

@@ -1,0 +1,107 @@
+"""The preview: the map, region A outlined, every sun at its true size, and a legend."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from .. import sphere
+from ..conversion import Conversion
+from ..environment import LUMINANCE_WEIGHTS, luminance
+from ..suns import Sun
+
+WIDTH = 1280
+"""Pixels; a wider map is averaged down to it, a narrower one enlarged."""
+
+REGION = (255, 64, 200)
+SUN = (255, 225, 0)
+PAPER, INK = (24, 24, 27), (235, 235, 235)
+
+
+def draw_preview(conversion: Conversion) -> Image.Image:
+    """An sRGB picture of the map with what became of it, and a legend below."""
+    environment = conversion.environment
+    picture = Image.fromarray(tone_mapped(environment.radiance))
+    picture = picture.resize((WIDTH, WIDTH // 2), Image.Resampling.BOX)
+    picture.paste(REGION, mask=_outline(conversion.strata.region_a))
+    draw = ImageDraw.Draw(picture)
+    font = ImageFont.load_default(15)
+    for rank, sun in reversed(list(enumerate(conversion.suns, start=1))):
+        _draw_sun(draw, sun, str(rank), font)
+    lines = _legend(conversion)
+    sheet = Image.new("RGB", (WIDTH, WIDTH // 2 + 22 * len(lines) + 16), PAPER)
+    sheet.paste(picture)
+    text = ImageDraw.Draw(sheet)
+    for number, (colour, line) in enumerate(lines):
+        text.text((14, WIDTH // 2 + 8 + 22 * number), line, colour, font)
+    return sheet
+
+
+def tone_mapped(radiance: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Radiance as sRGB bytes: the median luminance becomes a middle grey, highlights roll off."""
+    lum = luminance(radiance)
+    lit = lum[lum > 0]
+    middle = float(np.median(lit)) if lit.size else 1.0
+    exposed = radiance * np.float64(0.18 / middle)
+    bright = (lum * (0.18 / middle))[..., None]
+    # Reinhard's curve on luminance keeps colours; the clip afterwards only touches pure lights.
+    mapped = np.clip(exposed * 1.4 / (1 + bright), 0, 1)
+    low = mapped * 12.92
+    high = 1.055 * np.maximum(mapped, 0.0031308) ** (1 / 2.4) - 0.055
+    return np.round(255 * np.where(mapped <= 0.0031308, low, high)).astype(np.uint8)
+
+
+def _outline(region: NDArray[np.bool_]) -> Image.Image:
+    """The pixels just outside of the region, at the size of the preview."""
+    from scipy.ndimage import binary_dilation
+
+    scaled = Image.fromarray(region).resize((WIDTH, WIDTH // 2), Image.Resampling.NEAREST)
+    # One pixel of a large map may be lost between two of the preview; a group never all is.
+    if region.shape[1] > WIDTH:
+        rows, columns = np.nonzero(region)
+        small = np.array(scaled)
+        small[rows * (WIDTH // 2) // region.shape[0], columns * WIDTH // region.shape[1]] = True
+        scaled = Image.fromarray(small)
+    inside = np.array(scaled)
+    return Image.fromarray(binary_dilation(inside, iterations=2) & ~inside)
+
+
+def _draw_sun(draw: ImageDraw.ImageDraw, sun: Sun, name: str, font: ImageFont.FreeTypeFont) -> None:
+    u, v = sphere.to_image(sphere.circle(sun.to_light, sun.angular_diameter / 2))
+    points = np.stack([u * WIDTH, v * WIDTH / 2], axis=-1)
+    for start, end in zip(points[:-1], points[1:], strict=True):
+        if abs(start[0] - end[0]) < WIDTH / 2:  # not the piece that jumps over the seam
+            draw.line([tuple(start), tuple(end)], SUN, 2)
+    (x,), (y,) = (np.atleast_1d(a) for a in sphere.to_image(sun.to_light))
+    x, y = x * WIDTH, y * WIDTH / 2
+    for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        draw.line([(x + 14 * dx, y + 14 * dy), (x + 24 * dx, y + 24 * dy)], SUN, 2)
+    left = x + 45 > WIDTH
+    anchor = ("r" if left else "l") + ("a" if y < 40 else "d")
+    place = (x - 10 if left else x + 10, y + 10 if y < 40 else y - 10)
+    draw.text(place, name, SUN, font, anchor=anchor, stroke_width=2, stroke_fill=PAPER)
+
+
+def _legend(conversion: Conversion) -> list[tuple[tuple[int, int, int], str]]:
+    environment, account = conversion.environment, conversion.account
+    all_light = account.source @ LUMINANCE_WEIGHTS
+    lines = [
+        (INK, f"{environment.name}   {environment.width} x {environment.height}"),
+        (REGION, f"Outline: region A, {conversion.strata.share:.1%} of all light"),
+        (SUN, f"Circles: {_suns(conversion)}, {account.share:.1%} of all light, true size"),
+    ]
+    for rank, sun in enumerate(conversion.suns[:8], start=1):
+        part = sun.scalar_irradiance @ LUMINANCE_WEIGHTS / all_light
+        elevation = np.degrees(np.arctan2(sun.to_light[2], np.hypot(*sun.to_light[:2])))
+        size = np.degrees(sun.angular_diameter)
+        text = f"  {rank}: {part:.2%}, {size:.2f}° wide, elevation {elevation:+.1f}°"
+        lines.append((SUN, text))
+    if len(conversion.suns) > 8:
+        lines.append((SUN, f"  and {len(conversion.suns) - 8} more"))
+    return lines
+
+
+def _suns(conversion: Conversion) -> str:
+    count = len(conversion.suns)
+    return "1 sun" if count == 1 else f"{count} suns"

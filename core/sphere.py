@@ -1,0 +1,118 @@
+"""The equirectangular layout: the only place that knows how pixels lie on the sphere.
+
+Convention (Cycles): right-handed, Z up, the image centre looks along +X, u = 0.25 along +Y.
+    azimuth   = pi - 2 pi u,   u = (column + 0.5) / width
+    elevation = pi/2 - pi v,   v = (row + 0.5) / height   (rows run downwards)
+The columns wrap at the seam (u = 0 and 1 look along -X); every pixel of the first and of the last
+row touches a pole.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+
+def row_solid_angles(width: int, height: int) -> Floats:
+    """Exact solid angle of one pixel of each row, steradians, shape (height,).
+
+    A difference of cosines, written as a product so that the rows at the poles lose no digits.
+    """
+    polar = (np.arange(height) + 0.5) * (np.pi / height)
+    return (2 * np.pi / width) * 2 * np.sin(polar) * np.sin(np.pi / (2 * height))
+
+
+def to_directions(u: ArrayLike, v: ArrayLike) -> Floats:
+    """Unit vectors of image positions u, v in [0, 1] (v downwards), shape (..., 3)."""
+    azimuth = np.pi - 2 * np.pi * np.asarray(u, dtype=np.float64)
+    polar = np.pi * np.asarray(v, dtype=np.float64)
+    ring = np.sin(polar)
+    x, y, z = np.broadcast_arrays(ring * np.cos(azimuth), ring * np.sin(azimuth), np.cos(polar))
+    return np.stack([x, y, z], axis=-1)
+
+
+def to_image(directions: ArrayLike) -> tuple[Floats, Floats]:
+    """Image positions (u, v) in [0, 1] of vectors of shape (..., 3); their length does not matter."""
+    x, y, z = np.moveaxis(np.asarray(directions, dtype=np.float64), -1, 0)
+    u = 0.5 - np.arctan2(y, x) / (2 * np.pi)
+    v = np.arctan2(np.hypot(x, y), z) / np.pi
+    return u, v
+
+
+def pixel_directions(indices: NDArray[np.intp], width: int, height: int) -> Floats:
+    """Unit vectors through the centres of the pixels with these flat indices, shape (n, 3)."""
+    rows, columns = np.divmod(indices, width)
+    return to_directions((columns + 0.5) / width, (rows + 0.5) / height)
+
+
+def pixel_spread(indices: NDArray[np.intp], width: int, height: int) -> Floats:
+    """How much each pixel's own extent shortens a sum of directions: 1 - |mean direction|.
+
+    A patch of w by h radians has the second moment (w^2 + h^2) / 12 about its centre, and
+    1 - R is half of it. Without this a light of one pixel would have no size. Shape (n,).
+    """
+    rows = np.asarray(indices) // width
+    wide = (2 * np.pi / width) * np.sin((rows + 0.5) * np.pi / height)
+    high = np.pi / height
+    return (np.minimum(wide, np.pi) ** 2 + high**2) / 24
+
+
+def angle_between(a: ArrayLike, b: ArrayLike) -> Floats:
+    """Angle in radians between unit vectors, accurate at 0 and at pi (no arccos)."""
+    a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    return 2 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+
+
+def circle(to_centre: Floats, angular_radius: float, count: int = 361) -> Floats:
+    """Directions along a circle on the sphere around `to_centre`, closed, shape (count, 3)."""
+    first, second = tangents(to_centre)
+    turn = np.linspace(0, 2 * np.pi, count)[:, None]
+    rim = np.cos(turn) * first + np.sin(turn) * second
+    return np.cos(angular_radius) * to_centre + np.sin(angular_radius) * rim
+
+
+def tangents(direction: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors that stand upright on `direction` and on each other."""
+    helper = np.zeros(3)
+    helper[np.argmin(np.abs(direction))] = 1.0
+    first = np.cross(direction, helper)
+    first /= np.linalg.norm(first)
+    return first, np.cross(direction, first)
+
+
+def connected_groups(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int32], int]:
+    """Groups of pixels that touch on the sphere, corners included: (labels from 1, how many).
+
+    The plane's groups come from scikit-image; here they are joined across the seam and over the
+    poles. Labels follow the first pixel of each group in reading order.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from skimage.measure import label
+
+    labels, count = label(mask, return_num=True, connectivity=2)
+    pairs = [_pole_pairs(labels[0]), _pole_pairs(labels[-1]), _seam_pairs(labels)]
+    first, second = np.concatenate(pairs).T
+    graph = coo_array((np.ones(len(first), bool), (first, second)), shape=(count + 1, count + 1))
+    joined, component = connected_components(graph, directed=False)
+    # Component 0 is the background's, because label 0 is in no pair.
+    return component[labels].astype(np.int32), joined - 1
+
+
+def _pole_pairs(row: NDArray[np.integer]) -> NDArray[np.integer]:
+    lit = row[row > 0]
+    return np.stack([lit[:-1], lit[1:]], axis=-1) if len(lit) else np.empty((0, 2), row.dtype)
+
+
+def _seam_pairs(labels: NDArray[np.integer]) -> NDArray[np.integer]:
+    left, right = labels[:, 0], labels[:, -1]
+    pairs = np.concatenate(
+        [
+            np.stack([left, right], axis=-1),
+            np.stack([left[:-1], right[1:]], axis=-1),
+            np.stack([left[1:], right[:-1]], axis=-1),
+        ]
+    )
+    return pairs[(pairs > 0).all(axis=-1)]

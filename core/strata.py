@@ -1,0 +1,123 @@
+"""Strata of accumulated luminance; the bright region A and the rest B (paper, section 3).
+
+Luminance times solid angle is summed in increasing order of luminance. The dark strata, the first
+half, hold the share 1 - X of the sum and make up region B; the bright ones hold X and make up A.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import sphere
+from .environment import EnvironmentMap, luminance
+
+CALM = 30.0
+"""A calm map's brightest pixel, in means of that map. Above it, light is worth a lamp.
+
+Measured with Cycles (README, "How region A is chosen"): from about 30 on, what is left can be
+rendered without the world's importance sampling; lower thresholds add area, not energy.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Strata:
+    """n strata of one map.
+
+    luminance: float64 (height, width).
+    bounds: the n - 1 luminances between the strata, rising. A pixel belongs to stratum k (1 is
+    the darkest) when its luminance is above k - 1 of them.
+    share: the part of all light (solid-angle weighted luminance) that region A holds.
+    """
+
+    luminance: NDArray[np.float64]
+    bounds: NDArray[np.float64]
+    share: float
+
+    @property
+    def count(self) -> int:
+        return len(self.bounds) + 1
+
+    @property
+    def threshold(self) -> float:
+        """Luminance above which a pixel belongs to region A."""
+        return float(self.bounds[len(self.bounds) // 2])
+
+    @property
+    def region_a(self) -> NDArray[np.bool_]:
+        """Mask of region A, shape (height, width)."""
+        return self.luminance > self.threshold
+
+    def stratum(self, value: float) -> int:
+        """The stratum, 1 to n, that a luminance falls into."""
+        return int(np.searchsorted(self.bounds, value)) + 1
+
+
+def stratify(environment: EnvironmentMap, share: float | None, count: int) -> Strata:
+    """Cut a map into `count` strata so that region A holds `share` of its light.
+
+    share: 0 to 1, or None for the smallest share that takes whole peaks with their halo.
+    Pixels of equal luminance stay together, so the share that comes out is the nearest possible.
+    """
+    lum = luminance(environment.radiance)
+    solid = sphere.row_solid_angles(environment.width, environment.height)
+    if share is None and count == 2:
+        threshold = calm_threshold(lum, solid)
+        return Strata(lum, np.array([threshold]), 1 - _part_below(threshold, lum, solid))
+    levels = _Levels.of(lum, solid)
+    threshold = calm_threshold(lum, solid) if share is None else levels.bound(1 - share)
+    below = levels.below(threshold)
+    half = count // 2
+    dark = [levels.bound(below * k / half) for k in range(1, half)]
+    bright = [levels.bound(below + (1 - below) * k / half) for k in range(1, half)]
+    return Strata(lum, np.array([*dark, threshold, *bright]), 1 - below)
+
+
+def calm_threshold(lum: NDArray[np.float64], solid: NDArray[np.float64]) -> float:
+    """The luminance at which cutting all peaks leaves a map with no pixel above CALM means.
+
+    Cutting lowers the mean, which lowers the threshold, down to a fixed point. It exists and the
+    steps to it are monotone: t -> CALM * mean(min(L, t)) rises with t and starts above it.
+    """
+    sphere_area = 4 * np.pi
+    threshold = float(lum.max())
+    for _ in range(100):
+        mean = float(np.minimum(lum, threshold).sum(axis=1) @ solid) / sphere_area
+        if CALM * mean >= threshold * (1 - 1e-9):
+            break
+        threshold = CALM * mean
+    return threshold
+
+
+def _part_below(threshold: float, lum: NDArray[np.float64], solid: NDArray[np.float64]) -> float:
+    dark = np.where(lum <= threshold, lum, 0.0).sum(axis=1) @ solid
+    return float(dark / (lum.sum(axis=1) @ solid))
+
+
+@dataclass(frozen=True, eq=False)
+class _Levels:
+    """Accumulated luminance over a map's distinct luminances, rising; both (k,)."""
+
+    value: NDArray[np.float64]
+    accumulated: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, lum: NDArray[np.float64], solid: NDArray[np.float64]) -> _Levels:
+        value, inverse = np.unique(lum, return_inverse=True)
+        light = np.bincount(inverse.ravel(), (lum * solid[:, None]).ravel())
+        accumulated = np.cumsum(light)
+        return cls(value, accumulated / accumulated[-1])
+
+    def bound(self, part: float) -> float:
+        """The level at and below which `part` of all light lies, as nearly as levels allow."""
+        with_nothing = np.concatenate([[0.0], self.accumulated])
+        nearest = int(np.argmin(np.abs(with_nothing - part)))
+        # "-1" lies below every level: nothing is at or below it, black pixels included.
+        return float(self.value[nearest - 1]) if nearest else -1.0
+
+    def below(self, threshold: float) -> float:
+        """Part of all light at and below a luminance."""
+        index = int(np.searchsorted(self.value, threshold, side="right"))
+        return float(self.accumulated[index - 1]) if index else 0.0

@@ -1,0 +1,17 @@
+"""Every tolerance that the program promises or its tests use, once, with its reason."""
+
+ACCOUNT = 1e-6
+"""Suns + residual = source, per channel, as computed. Suns are what the float32 residual lacks,
+in float64, so only the summation itself is left: this is room, not need."""
+
+ACCOUNT_FLOAT32 = 1e-6
+"""The same, read back from a float32 file: the stored residual is the computed one."""
+
+ACCOUNT_HALF = 1e-3
+"""The same, read back from a half file: 11 bits of mantissa round each pixel by up to 4.9e-4."""
+
+HALF_ENERGY = 1e-4
+"""How much energy of a channel may be lost by rounding to half before float32 is written."""
+
+HALF_MAXIMUM = 65504.0
+"""The largest finite half float (IEEE 754 binary16)."""
