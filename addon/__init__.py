@@ -1,0 +1,27 @@
+"""The Blender side: settings, operators, panel. Everything heavy is imported when it is used."""
+
+import bpy
+
+from . import command, operators, panel, properties
+
+CLASSES = (
+    properties.SunsplitSettings,
+    operators.SUNSPLIT_OT_convert,
+    operators.SUNSPLIT_OT_restore,
+    panel.SUNSPLIT_PT_main,
+    panel.SUNSPLIT_PT_settings,
+)
+
+
+def register() -> None:
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Scene.sunsplit = bpy.props.PointerProperty(type=properties.SunsplitSettings)
+    command.register()
+
+
+def unregister() -> None:
+    command.unregister()
+    del bpy.types.Scene.sunsplit
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -8,7 +8,7 @@ save(conversion, "out", preview=True)
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .conversion import Conversion, convert
@@ -41,7 +41,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Import a public name when it is first used: enabling the add-on must not load scipy."""
     from importlib import import_module
 

@@ -68,7 +68,7 @@ class Cell:
 
     @property
     def angular_diameter(self) -> float:
-        """Diameter in radians, at most pi, of the uniform disc of the same total, mean direction and second moment.
+        """Diameter in radians, at most pi, of the uniform disc with the cell's moments.
 
         Such a disc has R = (1 + cos a) / 2, so a = 2 asin sqrt(1 - R); a hemisphere at most.
         """

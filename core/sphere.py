@@ -34,7 +34,7 @@ def to_directions(u: ArrayLike, v: ArrayLike) -> Floats:
 
 
 def to_image(directions: ArrayLike) -> tuple[Floats, Floats]:
-    """Image positions (u, v) in [0, 1] of vectors of shape (..., 3); their length does not matter."""
+    """Image positions (u, v) in [0, 1] of vectors (..., 3) of any length, as float64."""
     x, y, z = np.moveaxis(np.asarray(directions, dtype=np.float64), -1, 0)
     u = 0.5 - np.arctan2(y, x) / (2 * np.pi)
     v = np.arctan2(np.hypot(x, y), z) / np.pi

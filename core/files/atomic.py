@@ -27,7 +27,7 @@ def written_together(folder: Path, names: list[str]) -> Iterator[list[Path]]:
         for draft in drafts:
             _to_disk(draft)
         for draft, name in zip(drafts, names, strict=True):
-            os.replace(draft, folder / name)
+            draft.replace(folder / name)
     except OSError as error:
         reason = error.strerror or str(error)
         raise CannotWrite(f"Cannot write into {folder}: {reason}. Nothing was changed.") from error

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
@@ -70,7 +72,7 @@ def _outline(region: NDArray[np.bool_]) -> Image.Image:
 def _draw_sun(draw: ImageDraw.ImageDraw, sun: Sun, name: str, font: ImageFont.FreeTypeFont) -> None:
     u, v = sphere.to_image(sphere.circle(sun.to_light, sun.angular_diameter / 2))
     points = np.stack([u * WIDTH, v * WIDTH / 2], axis=-1)
-    for start, end in zip(points[:-1], points[1:], strict=True):
+    for start, end in pairwise(points):
         if abs(start[0] - end[0]) < WIDTH / 2:  # not the piece that jumps over the seam
             draw.line([tuple(start), tuple(end)], SUN, 2)
     (x,), (y,) = (np.atleast_1d(a) for a in sphere.to_image(sun.to_light))

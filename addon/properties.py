@@ -1,0 +1,75 @@
+"""`scene.sunsplit`: what the user chose for a scene, and what is needed to take it back."""
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ..core.settings import ConversionSettings
+
+DEFAULTS = ConversionSettings()
+
+CHOICES = {
+    "lights": IntProperty(
+        name="Lights",
+        description="At most so many sun lamps; fainter lights stay in the world",
+        default=DEFAULTS.lights,
+        min=1,
+        soft_max=64,
+    ),
+    "share_auto": BoolProperty(
+        name="Automatic Share",
+        description="Find the bright region by itself: whole lights with their halo",
+        default=True,
+    ),
+    "share": FloatProperty(
+        name="Share",
+        description="Part of all light in the bright region that becomes lamps",
+        default=0.5,
+        min=0.001,
+        max=1.0,
+        subtype="FACTOR",
+    ),
+    "strata": IntProperty(
+        name="Strata",
+        description="Levels of brightness that the map is cut into (an even number)",
+        default=DEFAULTS.strata,
+        min=2,
+        step=2,
+        soft_max=16,
+    ),
+    "residual": EnumProperty(
+        name="Rest",
+        description="What becomes of the light that no lamp gives",
+        items=[
+            ("map", "World Map", "The world shows the map without the lamps' light"),
+            ("none", "Nothing", "Lamps only: the rest of the light is left out"),
+        ],
+        default=DEFAULTS.residual,
+    ),
+}
+"""The settings of a conversion, once: for the scene and as arguments of the operator."""
+
+
+class SunsplitSettings(bpy.types.PropertyGroup):
+    """Settings of the next conversion, and what the last one has made."""
+
+    __annotations__ = CHOICES | {
+        "original_world": PointerProperty(
+            type=bpy.types.World, name="Original World", description="What Restore brings back"
+        ),
+        "converted_world": PointerProperty(
+            type=bpy.types.World, name="Converted World", description="What Restore removes"
+        ),
+        "collection": PointerProperty(
+            type=bpy.types.Collection, name="Suns", description="What holds the lamps"
+        ),
+        "report": StringProperty(
+            name="Report", description="What the last conversion did, a sentence a line"
+        ),
+    }
