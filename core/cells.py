@@ -72,7 +72,7 @@ class Cell:
 
         Such a disc has R = (1 + cos a) / 2, so a = 2 asin sqrt(1 - R); a hemisphere at most.
         """
-        return 4 * float(np.arcsin(np.sqrt(min(self.shortfall, 0.5))))
+        return min(4 * float(np.arcsin(np.sqrt(min(self.shortfall, 0.5)))), np.pi)
 
     def misfit(self) -> float:
         """Predicted shadow-edge error of a disc in the place of this cell, times its light.

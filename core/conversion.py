@@ -13,7 +13,7 @@ from .cells import Cell
 from .environment import EnvironmentMap
 from .placement.groups import WIDEST_DISC, cut_misfits
 from .progress import Progress, silent
-from .residual import surroundings
+from .residual import split_by_label, surroundings
 from .settings import ConversionSettings
 from .strata import Strata, stratify
 from .suns import Sun, disc_sun
@@ -62,21 +62,24 @@ def convert(
 
 
 def bright_groups(environment: EnvironmentMap, strata: Strata) -> list[Cell]:
-    """What each connected group of region A shines above its surroundings."""
+    """What each connected group of region A shines above its surroundings.
+
+    Groups are taken with one pixel around them: it holds the light's blurred rim, which would
+    otherwise be left as a bright ring and raise what is filled in.
+    """
     height, width = environment.height, environment.width
-    region = strata.region_a
-    labels, count = sphere.connected_groups(region)
+    labels, count = sphere.connected_groups(strata.region_a)
+    labels = sphere.grow_groups(labels, strata.luminance)
     pixels = np.flatnonzero(labels)
-    pixels = pixels[np.argsort(labels.ravel()[pixels], kind="stable")]
-    ends = np.cumsum(np.bincount(labels.ravel()[pixels], minlength=count + 1)[1:])
     solid = sphere.row_solid_angles(width, height)
-    flat = environment.radiance.reshape(-1, 3)
-    groups = []
-    for group in np.split(pixels, ends[:-1]) if count else []:
-        beneath = surroundings(environment.radiance, region, group)
-        # In float64 from the float32 that will be stored: the account then closes by itself.
-        excess = flat[group].astype(np.float64) - beneath
-        groups.append(Cell.of(group, excess * solid[group // width, None], width, height))
+    # In float64 from the float32 that will be stored: the account then closes by itself.
+    beneath = surroundings(environment.radiance, labels > 0)
+    excess = environment.radiance.reshape(-1, 3)[pixels].astype(np.float64) - beneath
+    flux = excess * solid[pixels // width, None]
+    groups = [
+        Cell.of(group, flux[np.searchsorted(pixels, group)], width, height)
+        for group in split_by_label(labels, count)
+    ]
     return [group for group in groups if group.total > 0]
 
 

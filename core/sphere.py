@@ -59,6 +59,45 @@ def pixel_spread(indices: NDArray[np.intp], width: int, height: int) -> Floats:
     return (np.minimum(wide, np.pi) ** 2 + high**2) / 24
 
 
+def neighbours(
+    indices: NDArray[np.intp], width: int, height: int, corners: bool = False
+) -> NDArray[np.intp]:
+    """Flat indices of the 4 pixels beside each pixel, or 8 with corners, over seam and poles.
+
+    indices: (n,). Returns (n, 4) or (n, 8). Over a pole lies the pixel half a turn away.
+    """
+    rows, columns = np.divmod(indices, width)
+    steps = [(0, -1), (0, 1), (-1, 0), (1, 0)]
+    if corners:
+        steps += [(-1, -1), (-1, 1), (1, -1), (1, 1)]
+    found = []
+    for down, right in steps:
+        row = rows + down
+        over = (row < 0) | (row >= height)
+        column = (columns + right + np.where(over, width // 2, 0)) % width
+        found.append(np.clip(row, 0, height - 1) * width + column)
+    return np.stack(found, axis=-1)
+
+
+def grow_groups(labels: NDArray[np.int32], brightness: Floats) -> NDArray[np.int32]:
+    """Groups larger by one pixel on all sides; where two claim it, the brighter neighbour's wins.
+
+    labels: (height, width), 0 outside of groups. brightness: of every pixel, (height, width).
+    """
+    height, width = labels.shape
+    grown = labels.copy()
+    inside = np.flatnonzero(labels)
+    around = neighbours(inside, width, height, corners=True)
+    claimed = around.ravel()
+    owner = np.repeat(labels.ravel()[inside], 8)
+    light = np.repeat(brightness.ravel()[inside], 8)
+    free = labels.ravel()[claimed] == 0
+    # Written in rising order of brightness, so the brightest claim stays.
+    order = np.argsort(light[free], kind="stable")
+    grown.ravel()[claimed[free][order]] = owner[free][order]
+    return grown
+
+
 def angle_between(a: ArrayLike, b: ArrayLike) -> Floats:
     """Angle in radians between unit vectors, accurate at 0 and at pi (no arccos)."""
     a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)

@@ -15,3 +15,7 @@ HALF_ENERGY = 1e-4
 
 HALF_MAXIMUM = 65504.0
 """The largest finite half float (IEEE 754 binary16)."""
+
+EQUIVARIANCE = 1e-6
+"""How far suns may differ, relatively, between a map and the same map turned or mirrored: what is
+filled in under a sun is stored as float32, and the solver's last digit decides how it rounds."""

@@ -13,24 +13,27 @@ from . import exr, image
 def load(path: str | Path, allow_ldr: bool = False) -> EnvironmentMap:
     """Read, check and repair a map. Raises UnusableInput with one clear sentence."""
     path = Path(path)
-    sha256 = _fingerprint(path)
-    if path.open("rb").read(4) == exr.MAGIC:
+    magic, sha256 = _identify(path)
+    if magic == exr.MAGIC:
         pixels, warnings = exr.read(path)
     else:
         pixels, warnings = image.read(path, allow_ldr), []
     return environment_from_pixels(pixels, path.stem, path.name, sha256, tuple(warnings))
 
 
-def _fingerprint(path: Path) -> str:
+def _identify(path: Path) -> tuple[bytes, str]:
+    """The file's first four bytes and the SHA-256 of all of them."""
     if path.is_dir():
         raise UnusableInput(f"{path} is a folder, not an image.")
     try:
         with path.open("rb") as file:
+            magic = file.read(4)
+            file.seek(0)
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     except FileNotFoundError:
         raise UnusableInput(f"{path} does not exist.") from None
     except OSError as error:
         raise UnusableInput(f"{path} cannot be read: {error.strerror}.") from error
-    if path.stat().st_size == 0:
+    if not magic:
         raise UnusableInput(f"{path} is empty.")
-    return digest
+    return magic, digest

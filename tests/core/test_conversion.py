@@ -1,0 +1,208 @@
+"""The whole pipeline: properties that hold for any map."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sunsplit.core import ConversionSettings, convert, load, sphere
+from sunsplit.core.settings import BadSetting
+from sunsplit.core.tolerances import ACCOUNT, EQUIVARIANCE
+
+from tests.maps import direction, disc_energy, environment, paint_disc, painted_radius, sky
+
+WIDTH = 64
+
+
+@st.composite
+def hdr_maps(draw):
+    """Random skies with a few lights of any strength, anywhere, seam and poles included."""
+    random = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    pixels = random.random((WIDTH // 2, WIDTH, 3)) * 10.0 ** draw(st.integers(-4, 4))
+    for _ in range(draw(st.integers(0, 5))):
+        row, column = draw(st.integers(0, WIDTH // 2 - 1)), draw(st.integers(0, WIDTH - 1))
+        tint = np.array(draw(st.sampled_from([(1, 1, 1), (1, 0.5, 0), (0, 0, 1), (1, 0, 0)])))
+        pixels[row, column] += tint * 10.0 ** draw(st.integers(-2, 9))
+    return environment(pixels)
+
+
+@st.composite
+def choices(draw):
+    return ConversionSettings(
+        lights=draw(st.integers(1, 20)),
+        share=draw(st.none() | st.floats(0.01, 1)),
+        strata=draw(st.sampled_from([2, 4, 6])),
+    )
+
+
+@given(hdr_maps(), choices())
+def test_the_account_closes_and_suns_are_sane(found, chosen):
+    conversion = convert(found, chosen)
+    assert conversion.account.relative_error.max() <= ACCOUNT
+    assert len(conversion.suns) <= chosen.lights
+    assert np.isfinite(conversion.residual).all()
+    assert (conversion.residual >= 0).all()
+    assert (conversion.residual <= found.radiance).all()
+    for sun in conversion.suns:
+        assert np.linalg.norm(sun.to_light) == pytest.approx(1, abs=1e-12)
+        assert 0 < sun.angular_diameter <= np.pi
+        assert (sun.irradiance >= 0).all()
+        assert (sun.irradiance <= sun.scalar_irradiance).all()
+        assert 1 <= sun.stratum <= chosen.strata
+    strengths = [sun.scalar_irradiance @ [0.2126, 0.7152, 0.0722] for sun in conversion.suns]
+    assert strengths == sorted(strengths, reverse=True)
+
+
+@given(hdr_maps(), choices(), st.integers(1, WIDTH - 1))
+def test_turning_the_map_turns_the_suns(found, chosen, shift):
+    before = convert(found, chosen)
+    after = convert(environment(np.roll(found.radiance, shift, axis=1)), chosen)
+    turn = -2 * np.pi * shift / WIDTH
+    matrix = np.array(
+        [[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]]
+    )
+    # Which of two equal cuts is made may depend on the last digit, so lists are compared only
+    # where nothing was cut; the light that suns and residual get must agree always.
+    assert after.account.source == pytest.approx(before.account.source, rel=1e-12)
+    if chosen.share is None:
+        assert len(after.suns) == len(before.suns)
+        for old, new in zip(before.suns, after.suns, strict=True):
+            assert new.to_light == pytest.approx(matrix @ old.to_light, abs=EQUIVARIANCE)
+            assert new.irradiance == pytest.approx(old.irradiance, rel=EQUIVARIANCE)
+            assert new.angular_diameter == pytest.approx(old.angular_diameter, rel=EQUIVARIANCE)
+
+
+@given(hdr_maps(), choices(), st.integers(-6, 6))
+def test_a_map_scaled_by_a_power_of_two_scales_to_the_bit(found, chosen, power):
+    before = convert(found, chosen)
+    after = convert(environment(found.radiance * np.float32(2.0**power)), chosen)
+    assert len(after.suns) == len(before.suns)
+    for old, new in zip(before.suns, after.suns, strict=True):
+        assert (new.irradiance == old.irradiance * 2.0**power).all()
+        assert (new.to_light == old.to_light).all()
+        assert new.angular_diameter == old.angular_diameter
+    assert (after.residual == before.residual * np.float32(2.0**power)).all()
+
+
+@given(hdr_maps())
+def test_mirroring_the_map_mirrors_the_suns(found):
+    before = convert(found)
+    after = convert(environment(found.radiance[:, ::-1]))
+    assert len(after.suns) == len(before.suns)
+    for old, new in zip(before.suns, after.suns, strict=True):
+        assert new.to_light == pytest.approx(old.to_light * [1, -1, 1], abs=EQUIVARIANCE)
+        assert new.irradiance == pytest.approx(old.irradiance, rel=EQUIVARIANCE)
+
+
+@pytest.mark.parametrize(
+    "place",
+    [direction(40, 20), direction(180, -35), direction(0, 90), direction(0, -90)],
+    ids=["side", "seam", "zenith", "nadir"],
+)
+def test_a_sun_is_found_and_the_sky_stays(place):
+    pixels = sky(512, 0.3)
+    paint_disc(pixels, place, 2, (500, 400, 300))
+    conversion = convert(environment(pixels))
+    (sun,) = conversion.suns
+    assert np.degrees(sphere.angle_between(sun.to_light, place)) < 0.02
+    assert np.degrees(sun.angular_diameter) == pytest.approx(
+        2 * painted_radius(2, 512, place), rel=0.02
+    )
+    assert sun.scalar_irradiance == pytest.approx(
+        disc_energy(2, 1) * np.array([500, 400, 300]), rel=5e-3
+    )
+    # What stays under the sun is as bright as its surroundings: no hole, no rest of the sun.
+    assert conversion.residual.min() == pytest.approx(0.3, rel=1e-6)
+    assert conversion.residual.max() == pytest.approx(0.3, rel=1e-6)
+
+
+def test_no_hole_in_a_gradient():
+    """Under a sun on a sloping sky the residual follows the slope."""
+    pixels = sky(256, 0.0) + np.linspace(2, 1, 128)[:, None, None]
+    clean = pixels.copy()
+    paint_disc(pixels, direction(30, 30), 3, (3000, 3000, 3000))
+    conversion = convert(environment(pixels))
+    error = np.abs(conversion.residual - clean) / clean
+    inside = conversion.strata.region_a
+    assert inside.sum() > 20
+    assert error[inside].max() < 0.02
+
+
+def test_opposite_suns_stay_two():
+    pixels = sky(256, 0.1)
+    for place in (direction(10, 30), direction(190, -30)):
+        paint_disc(pixels, place, 3, (900, 900, 900))
+    assert len(convert(environment(pixels)).suns) == 2
+
+
+def test_the_faintest_stay_in_the_residual_when_lights_run_out():
+    pixels = sky(256, 0.1)
+    for number in range(5):
+        paint_disc(pixels, direction(60 * number, 20), 2, np.full(3, 1000.0 + 100 * number))
+    conversion = convert(environment(pixels), ConversionSettings(lights=3))
+    azimuths = [np.degrees(np.arctan2(*sun.to_light[1::-1])) % 360 for sun in conversion.suns]
+    assert azimuths == pytest.approx([240, 180, 120], abs=0.2)
+    assert conversion.residual.max() > 900
+    assert "limit of 3 lights" in " ".join(conversion.notes)
+
+
+def test_a_constant_map_needs_no_sun():
+    conversion = convert(environment(sky(64, 0.7)))
+    assert conversion.suns == ()
+    assert (conversion.residual == np.float32(0.7)).all()
+    assert "needs no sun" in conversion.notes[0]
+
+
+def test_a_cross_of_light_is_cut_and_a_sun_is_not():
+    pixels = sky(512, 0.05)
+    pixels[150:156, 100:200] = 300
+    paint_disc(pixels, direction(-60, 40), 5, (300, 300, 300))
+    sizes = [np.degrees(sun.angular_diameter) for sun in convert(environment(pixels)).suns]
+    assert len(sizes) > 2
+    assert sum(abs(size - 10) < 0.3 for size in sizes) == 1
+
+
+def test_share_one_turns_all_light_into_suns():
+    found = load_random()
+    conversion = convert(found, ConversionSettings(lights=8, share=1.0, residual="none"))
+    assert conversion.residual is None
+    assert conversion.account.suns == pytest.approx(conversion.account.source, rel=1e-9)
+    assert len(conversion.suns) == 8
+
+
+def load_random():
+    pixels = np.random.default_rng(3).random((32, 64, 3))
+    return environment(pixels)
+
+
+def test_the_real_map(sunrise):
+    conversion = convert(load(sunrise))
+    (sun,) = conversion.suns
+    elevation = np.degrees(np.arcsin(sun.to_light[2]))
+    assert elevation == pytest.approx(8.0, abs=0.2)
+    assert 0.5 < np.degrees(sun.angular_diameter) < 1.2
+    assert conversion.account.share == pytest.approx(0.78, abs=0.01)
+    assert conversion.account.relative_error.max() <= ACCOUNT
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [{"lights": 0}, {"share": 0}, {"share": 1.5}, {"strata": 3}, {"residual": "hole"}],
+)
+def test_settings_outside_their_limits_say_so(bad):
+    with pytest.raises(BadSetting, match=next(iter(bad))):
+        ConversionSettings(**bad)
+
+
+def test_progress_rises_and_cancel_passes_through(sunrise):
+    seen = []
+    convert(load(sunrise), progress=lambda stage, part: seen.append(part))
+    assert seen == sorted(seen)
+    assert seen[-1] == 1
+
+    def stop(stage, part):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        convert(load(sunrise), progress=stop)

@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sunsplit.core import sphere
+
+from tests.maps import direction
+
+
+@pytest.mark.parametrize("height", [1, 2, 3, 256, 8192])
+def test_solid_angles_cover_the_sphere(height):
+    solid = sphere.row_solid_angles(2 * height, height)
+    assert solid.sum() * 2 * height == pytest.approx(4 * np.pi, rel=1e-13)
+
+
+def test_the_pole_row_of_a_large_map_is_exact():
+    # 1 - cos x = 2 sin^2(x / 2): the closed form that a difference of cosines loses.
+    exact = (2 * np.pi / 16384) * 2 * np.sin(np.pi / 8192 / 2) ** 2
+    assert sphere.row_solid_angles(16384, 8192)[0] == pytest.approx(exact, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("u", "v", "expected"),
+    [
+        (0.5, 0.5, (1, 0, 0)),
+        (0.25, 0.5, (0, 1, 0)),
+        (0.75, 0.5, (0, -1, 0)),
+        (0.0, 0.5, (-1, 0, 0)),
+        (0.5, 0.0, (0, 0, 1)),
+        (0.5, 1.0, (0, 0, -1)),
+    ],
+)
+def test_axes_are_those_of_cycles(u, v, expected):
+    assert sphere.to_directions(u, v) == pytest.approx(expected, abs=1e-15)
+
+
+@given(st.floats(0.001, 0.999), st.floats(0.001, 0.999))
+def test_image_and_direction_are_inverses(u, v):
+    assert sphere.to_image(sphere.to_directions(u, v)) == pytest.approx((u, v), abs=1e-12)
+
+
+def test_pixel_centres():
+    found = sphere.pixel_directions(np.array([0, 7, 8 * 3 + 4]), 8, 4)
+    u, v = sphere.to_image(found)
+    assert u == pytest.approx([0.5 / 8, 7.5 / 8, 4.5 / 8])
+    assert v == pytest.approx([0.5 / 4, 0.5 / 4, 3.5 / 4])
+
+
+@given(st.floats(1e-9, np.pi))
+def test_angles_are_exact_at_both_ends(angle):
+    b = np.array([np.cos(angle), np.sin(angle), 0])
+    assert sphere.angle_between(np.array([1.0, 0, 0]), b) == pytest.approx(angle, rel=1e-12)
+
+
+def test_a_group_crosses_the_seam():
+    mask = np.zeros((8, 16), bool)
+    mask[3, 0] = mask[4, 15] = True
+    mask[3, 7] = True
+    labels, count = sphere.connected_groups(mask)
+    assert count == 2
+    assert labels[3, 0] == labels[4, 15] != labels[3, 7]
+
+
+@pytest.mark.parametrize("row", [0, -1])
+def test_a_group_crosses_a_pole(row):
+    mask = np.zeros((8, 16), bool)
+    mask[row, 2] = mask[row, 10] = True
+    _, count = sphere.connected_groups(mask)
+    assert count == 1
+
+
+def test_no_group_in_an_empty_mask_and_one_in_a_full_one():
+    assert sphere.connected_groups(np.zeros((4, 8), bool))[1] == 0
+    labels, count = sphere.connected_groups(np.ones((4, 8), bool))
+    assert count == 1
+    assert (labels == 1).all()
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 15))
+def test_groups_do_not_depend_on_where_the_seam_is(seed, shift):
+    mask = np.random.default_rng(seed).random((8, 16)) < 0.3
+    labels, count = sphere.connected_groups(mask)
+    rolled, rolled_count = sphere.connected_groups(np.roll(mask, shift, axis=1))
+    assert count == rolled_count
+    pairs = set(zip(np.roll(labels, shift, axis=1).ravel(), rolled.ravel(), strict=True))
+    assert len(pairs) == len({a for a, _ in pairs}) == len({b for _, b in pairs})
+
+
+def test_a_circle_lies_at_its_radius():
+    centre = direction(77, 88.5)
+    rim = sphere.circle(centre, np.radians(3.0))
+    assert sphere.angle_between(rim, centre) == pytest.approx(np.radians(3.0), rel=1e-12)
