@@ -56,7 +56,7 @@ def test_irradiance_of_a_disc_in_closed_form(radius):
     assert sun.irradiance == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize("row", [0, 100, 255])
+@pytest.mark.parametrize("row", [20, 100, 240])
 def test_one_pixel_is_as_large_as_itself(row):
     pixels = sky(512, 0.0)
     pixels[row, 7] = 1e5

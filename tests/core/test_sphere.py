@@ -41,11 +41,22 @@ def test_image_and_direction_are_inverses(u, v):
     assert sphere.to_image(sphere.to_directions(u, v)) == pytest.approx((u, v), abs=1e-12)
 
 
-def test_pixel_centres():
-    found = sphere.pixel_directions(np.array([0, 7, 8 * 3 + 4]), 8, 4)
-    u, v = sphere.to_image(found)
-    assert u == pytest.approx([0.5 / 8, 7.5 / 8, 4.5 / 8])
-    assert v == pytest.approx([0.5 / 4, 0.5 / 4, 3.5 / 4])
+def test_pixels_are_found_at_their_centroids():
+    """Against the mean direction of 400 x 400 points in each pixel, weighted by solid angle."""
+    for width, row, column in [(8, 0, 3), (8, 2, 7), (64, 0, 0), (64, 31, 9), (64, 12, 40)]:
+        height = width // 2
+        fine = (np.arange(400) + 0.5) / 400
+        v, u = (row + fine[:, None]) / height, (column + fine[None, :]) / width
+        weight = np.sin(np.pi * v) / np.sin(np.pi * v).sum() / 400
+        mean = np.einsum(
+            "ij,ijk->k", np.broadcast_to(weight, (400, 400)), sphere.to_directions(u, v)
+        )
+        index = np.array([row * width + column])
+        length = np.linalg.norm(mean)
+        (found,) = sphere.pixel_directions(index, width, height)
+        pixel = np.pi / height
+        assert sphere.angle_between(found, mean / length) < 0.03 * pixel
+        assert sphere.pixel_spread(index, width, height)[0] == pytest.approx(1 - length, rel=0.1)
 
 
 @given(st.floats(1e-9, np.pi))

@@ -1,0 +1,124 @@
+"""What a user does with the extension, in a Blender of its own; run by test_extension.py.
+
+    python -I -S session.py PACKAGES ZIP HDRI FOLDER
+
+PACKAGES: a folder with Blender's Python module and nothing that Sunsplit needs; with -S it is all
+there is beside the standard library, so that the libraries can only come from the zip's wheels.
+Writes what it saw to FOLDER/report.json.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+import json
+import sys
+from pathlib import Path
+
+PACKAGES, ZIP, HDRI, FOLDER = sys.argv[1:5]
+sys.path.insert(0, PACKAGES)
+
+import bpy  # noqa: E402
+
+MODULE = "bl_ext.user_default.sunsplit"
+LIBRARIES = ("scipy", "skimage", "OpenEXR", "OpenImageIO", "PIL", "tqdm", "networkx", "imageio")
+
+
+def main() -> None:
+    """Install, use, disable and enable again; then the command line of the same installation."""
+    report = {"install": install()}
+    light_by(HDRI)
+    report["before"] = seen()
+    report["convert"] = pressed(bpy.ops.sunsplit.convert)
+    report["libraries_to_convert"] = loaded()
+    report["restore"] = pressed(bpy.ops.sunsplit.restore)
+    bpy.ops.preferences.addon_disable(module=MODULE)
+    report["disabled"] = present()
+    bpy.ops.preferences.addon_enable(module=MODULE)
+    report["enabled_again"] = present()
+    report["convert_again"] = pressed(bpy.ops.sunsplit.convert)
+    report["command_line"] = command_line()
+    report["libraries"] = {name: sys.modules[name].__file__ for name in loaded()}
+    own = {n: m for n, m in sys.modules.items() if n == MODULE or n.startswith(f"{MODULE}.")}
+    report["own_modules"] = {name: module.__file__ for name, module in own.items()}
+    report["foreign_sunsplit"] = "sunsplit" in sys.modules
+    (Path(FOLDER) / "report.json").write_text(json.dumps(report, indent=1), encoding="utf-8")
+
+
+def install() -> dict[str, object]:
+    """Install from the zip; what that imported."""
+    before = set(sys.modules)
+    result = bpy.ops.extensions.package_install_files(
+        filepath=ZIP, repo="user_default", enable_on_install=True, overwrite=True
+    )
+    # The first parts of the names: `scipy` of `scipy.ndimage`.
+    imported = {name.partition(".")[0] for name in set(sys.modules) - before}
+    return {
+        "result": list(result),
+        "imported": sorted(imported),
+        "loaded_before": sorted(before & set(LIBRARIES)),
+        "present": present(),
+    }
+
+
+def present() -> dict[str, bool]:
+    """What of the add-on Blender knows at the moment."""
+    return {
+        "settings": hasattr(bpy.context.scene, "sunsplit"),
+        "operator": hasattr(bpy.types, "SUNSPLIT_OT_convert"),
+        "panel": hasattr(bpy.types, "SUNSPLIT_PT_main"),
+        "preference": MODULE in bpy.context.preferences.addons,
+    }
+
+
+def light_by(path: str) -> None:
+    """Give the scene a world that shows a map."""
+    world = bpy.data.worlds.new("Sky")
+    if bpy.app.version < (5, 0):
+        world.use_nodes = True
+    bpy.context.scene.world = world
+    tree = world.node_tree
+    tree.nodes.clear()
+    texture = tree.nodes.new("ShaderNodeTexEnvironment")
+    background = tree.nodes.new("ShaderNodeBackground")
+    output = tree.nodes.new("ShaderNodeOutputWorld")
+    texture.image = bpy.data.images.load(path)
+    tree.links.new(texture.outputs["Color"], background.inputs["Color"])
+    tree.links.new(background.outputs[0], output.inputs["Surface"])
+
+
+def pressed(operator: object) -> dict[str, object]:
+    """Call an operator as its button does; what the scene looks like afterwards."""
+    return {"result": list(operator()), **seen()}
+
+
+def seen() -> dict[str, object]:
+    """The scene's world and the lamps of a conversion."""
+    collection = bpy.data.collections.get("Sunsplit Suns")
+    lamps = list(collection.objects) if collection else []
+    maps = [n for n in bpy.context.scene.world.node_tree.nodes if n.type == "TEX_ENVIRONMENT"]
+    return {
+        "world": bpy.context.scene.world.name,
+        "maps": len(maps),
+        "lamps": [[lamp.type, lamp.data.type, lamp.data.energy] for lamp in lamps],
+    }
+
+
+def loaded() -> list[str]:
+    return [name for name in LIBRARIES if name in sys.modules]
+
+
+def command_line() -> dict[str, object]:
+    """Convert the file itself, with a picture: this needs what Blender does not ask for."""
+    cli = importlib.import_module(f"{MODULE}.core.cli")
+    folder = Path(FOLDER) / "converted"
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        status = cli.main(["convert", HDRI, "-o", str(folder), "--preview"])
+    files = sorted(path.name for path in folder.iterdir())
+    return {"status": status, "files": files, "said": said.getvalue()}
+
+
+if __name__ == "__main__":
+    main()

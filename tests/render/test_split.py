@@ -1,0 +1,155 @@
+"""Renders of the plain HDRI against suns + residual: the split keeps the light."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix, Vector
+from sunsplit.core import load, sphere
+
+from tests.blender import (
+    add_mesh,
+    ball_mesh,
+    box_mesh,
+    camera_towards,
+    diffuse,
+    fresh_scene,
+    hdri_world,
+    material,
+    plate_mesh,
+    render,
+    write_map,
+)
+from tests.maps import direction, paint_disc, sky
+from tests.render.compare import MEAN, estimate, means_agree, pixels_agree
+
+ORIENTATIONS = {
+    "up": (0, 0, 1),
+    "down": (0, 0, -1),
+    "east": (1, 0, 0),
+    "north": (0, 1, 0),
+    "west": (-1, 0, 0),
+    "south": (0, -1, 0),
+    "tilted": (1, 1, 1),
+    "tilted away": (-1, 1, -1),
+}
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory):
+    """A sloping sky with a warm key light, a cold one and one on the seam."""
+    pixels = sky(512, 0.0) + np.linspace(0.5, 0.1, 256)[:, None, None] * (0.8, 1, 1.2)
+    paint_disc(pixels, direction(-50, 35), 3, (300, 250, 180))
+    paint_disc(pixels, direction(80, 15), 5, (20, 40, 70))
+    paint_disc(pixels, direction(180, 50), 2, (90, 90, 90))
+    return write_map(tmp_path_factory.mktemp("maps") / "studio.exr", pixels)
+
+
+@pytest.fixture(params=["sunrise", "studio"])
+def hdri(request):
+    return request.getfixturevalue(request.param)
+
+
+def irradiance(path, normal):
+    """Irradiance of a plate in closed form: the map integrated in float64, (3,)."""
+    environment = load(path)
+    height, width = environment.height, environment.width
+    v, u = (np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width
+    cosine = np.maximum(sphere.to_directions(u[None, :], v[:, None]) @ normal, 0)
+    weight = cosine * sphere.row_solid_angles(width, height)[:, None]
+    return np.einsum("ijk,ij->k", environment.radiance, weight)
+
+
+@pytest.mark.parametrize("normal", ORIENTATIONS.values(), ids=ORIENTATIONS.keys())
+def test_a_white_plate(tmp_path, hdri, normal):
+    scene = fresh_scene()
+    hdri_world(scene, hdri)
+    normal = np.array(normal) / np.linalg.norm(normal)
+    turn = Vector(normal).to_track_quat("Z", "Y").to_matrix().to_4x4()
+    add_mesh(scene, plate_mesh(1), diffuse("White", 0.8), turn)
+    camera = camera_towards(scene, -normal, 30, 48)
+    camera.location = Vector(normal) * 2
+    expected = 0.8 / np.pi * irradiance(hdri, normal)
+    plain = estimate(scene, tmp_path, 48)
+    bpy.ops.sunsplit.convert()
+    split = estimate(scene, tmp_path, 48)
+    means_agree(plain, split, tmp_path)
+    found = split.mean.mean(axis=(0, 1))
+    print(f"closed form {expected}, split {found}, ratio - 1 {found / expected - 1}")
+    assert found == pytest.approx(expected, rel=MEAN)
+
+
+def add_columns(scene):
+    add_mesh(scene, plate_mesh(6), diffuse("Ground", 0.6), Matrix())
+    for number in range(5):
+        place = Matrix.Translation((np.cos(number * 2.4) * 1.6, np.sin(number * 2.4) * 1.6, 0))
+        add_mesh(scene, box_mesh(0.12, 0.12, 0.7), diffuse("Column", 0.7), place)
+    camera = camera_towards(scene, np.array([-0.75, 0, -0.5]), 40, 96)
+    camera.location = (6, 0, 4.2)
+
+
+def test_a_scene_with_shadows(tmp_path, hdri):
+    scene = fresh_scene()
+    hdri_world(scene, hdri)
+    add_columns(scene)
+    plain = estimate(scene, tmp_path, 96)
+    bpy.ops.sunsplit.convert()
+    split = estimate(scene, tmp_path, 96)
+    means_agree(plain, split, tmp_path)
+    pixels_agree(plain, split, tmp_path, slack=0.02)
+
+
+BALLS = {
+    "mirror": {"Metallic": 1.0, "Roughness": 0.0},
+    "glass": {"Transmission_Weight": 1.0, "Roughness": 0.0, "IOR": 1.45},
+    "rough metal": {"Metallic": 1.0, "Roughness": 0.4},
+}
+
+
+def add_ball(scene, surface):
+    # Light that a ball throws onto others is noise that these tests do not ask about.
+    scene.cycles.caustics_reflective = scene.cycles.caustics_refractive = False
+    add_mesh(scene, ball_mesh(1), material("Ball", (1, 1, 1), **surface), Matrix())
+    camera = camera_towards(scene, np.array([0.6, -0.75, -0.2]), 30, 96)
+    camera.location = Vector((-0.6, 0.75, 0.2)) * 4.2
+
+
+@pytest.mark.parametrize("surface", BALLS.values(), ids=BALLS.keys())
+def test_a_ball(tmp_path, studio, surface):
+    """Every kind of ray meets each sun once: not twice, as disc and in the map, and not never."""
+    scene = fresh_scene()
+    hdri_world(scene, studio)
+    add_ball(scene, surface)
+    plain = estimate(scene, tmp_path, 128)
+    bpy.ops.sunsplit.convert()
+    split = estimate(scene, tmp_path, 128)
+    means_agree(plain, split, tmp_path)
+    pixels_agree(plain, split, tmp_path, slack=0.05)
+    # The suns alone, where they are to be seen: their light, not only the mean of all.
+    bright = plain.mean.max(axis=-1) > 4 * np.median(plain.mean)
+    ratio = split.mean[bright].sum(axis=0) / plain.mean[bright].sum(axis=0)
+    print(f"{bright.sum()} bright pixels, ratio of their light {ratio}")
+    assert bright.sum() > 3
+    assert ratio == pytest.approx(np.ones(3), abs=0.05)
+
+
+def test_a_rough_ball_in_the_real_map(tmp_path, sunrise):
+    scene = fresh_scene()
+    hdri_world(scene, sunrise)
+    add_ball(scene, BALLS["rough metal"])
+    plain = estimate(scene, tmp_path, 128)
+    bpy.ops.sunsplit.convert()
+    split = estimate(scene, tmp_path, 128)
+    means_agree(plain, split, tmp_path)
+    pixels_agree(plain, split, tmp_path, slack=0.05)
+
+
+def test_the_camera_sees_the_original_map(tmp_path, studio):
+    scene = fresh_scene()
+    hdri_world(scene, studio)
+    camera_towards(scene, direction(-50, 35), 40, 96)
+    before = render(scene, tmp_path, 16)
+    bpy.ops.sunsplit.convert()
+    after = render(scene, tmp_path, 16)
+    assert after == pytest.approx(before, rel=1e-5, abs=1e-6)
