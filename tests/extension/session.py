@@ -2,8 +2,8 @@
 
     python -I -S session.py PACKAGES ZIP HDRI FOLDER
 
-PACKAGES: a folder with Blender's Python module and nothing that Sunsplit needs; with -S it is all
-there is beside the standard library, so that the libraries can only come from the zip's wheels.
+PACKAGES: a folder with Blender's Python module and what that needs, nothing else; with -S it is
+all there is beside the standard library, so that scipy and the like can only come from the zip.
 Writes what it saw to FOLDER/report.json.
 """
 
@@ -114,7 +114,7 @@ def command_line() -> dict[str, object]:
     cli = importlib.import_module(f"{MODULE}.core.cli")
     folder = Path(FOLDER) / "converted"
     said = io.StringIO()
-    with contextlib.redirect_stdout(said):
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
         status = cli.main(["convert", HDRI, "-o", str(folder), "--preview"])
     files = sorted(path.name for path in folder.iterdir())
     return {"status": status, "files": files, "said": said.getvalue()}

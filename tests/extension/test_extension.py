@@ -18,12 +18,16 @@ from tools.build_extension import MANIFEST, PLATFORMS, PYTHONS, ROOT, SHIPPED, T
 
 BLENDER = ".".join(importlib.metadata.version("bpy").split(".")[:2])
 
-BLENDER_NEEDS = ("bpy", "numpy", "numpy.libs", "requests", "urllib3", "certifi", "idna")
+BLENDER_NEEDS = (
+    *("bpy", "numpy", "numpy.libs", "zstandard"),
+    *("requests", "urllib3", "certifi", "idna", "charset_normalizer"),
+    *("cattrs", "cattr", "attrs", "attr", "typing_extensions.py"),
+)
 """Packages in this environment that a Blender has inside itself; the others are not for it."""
 
 
 def run(command: list[str], **environment: str) -> str:
-    """Run a program and give its output; when it fails, the test shows all it said."""
+    """Run a program; all it said, which is also shown when it fails."""
     done = subprocess.run(
         command,
         capture_output=True,
@@ -34,7 +38,7 @@ def run(command: list[str], **environment: str) -> str:
     )
     if done.returncode != 0:
         pytest.fail(f"{' '.join(command)}\n{done.stdout}\n{done.stderr}")
-    return done.stdout
+    return done.stdout + done.stderr
 
 
 def build(folder: Path, **environment: str) -> Path:
@@ -187,6 +191,12 @@ def test_damaged_wheel_does_not_count(tmp_path: Path):
 def test_installs_and_enables(session: dict):
     assert session["install"]["result"] == ["FINISHED"], session["log"]
     assert all(session["install"]["present"].values())
+
+
+def test_blender_reports_no_error(session: dict):
+    """Blender prints an exception in an add-on, its own ones included, and goes on."""
+    assert "Traceback" not in session["log"], session["log"]
+    assert "Warning" not in session["log"], session["log"]
 
 
 def test_enabling_imports_no_library(session: dict):
