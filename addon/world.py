@@ -22,6 +22,9 @@ CALM_ENOUGH = 4.0
 """Second moment of a residual, mean(L^2) / mean(L)^2 over the sphere, up to which sampling by
 surfaces alone (world importance sampling NONE) has at least as little noise as a table."""
 
+LINEAR_SPACES = ("Linear ", "Non-Color", "ACEScg", "ACES2065-1", "scene_linear")
+"""How the names of colour spaces begin in which numbers are light."""
+
 SMALL_TABLE = 512
 """Width of the sampling table for a residual that is calm, but not calm enough to do without."""
 
@@ -86,6 +89,12 @@ def read_image(image: bpy.types.Image) -> EnvironmentMap:
     if not image.is_float:
         raise UnusableInput(
             f'"{image.name}" is an LDR image without linear light: use the HDR version of the map.'
+        )
+    space = image.colorspace_settings.name
+    if not space.startswith(LINEAR_SPACES):
+        raise UnusableInput(
+            f'"{image.name}" is read as {space}, in which numbers are not light: '
+            "set its colour space to Linear Rec.709 (or what the file was made in)."
         )
     pixels = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(pixels)

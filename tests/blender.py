@@ -7,8 +7,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 import OpenEXR
-import sunsplit
 from mathutils import Matrix, Vector
+
+import sunsplit
 
 
 def fresh_scene() -> bpy.types.Scene:

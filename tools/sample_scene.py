@@ -8,7 +8,6 @@ rough metal for reflections. Written by a script, so that nobody has to trust a 
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import bpy
@@ -18,7 +17,7 @@ FOLDER = Path(__file__).resolve().parent.parent / "sample_scenes"
 HDRI = "spruit_sunrise_1k.hdr"
 
 CAMERA = Vector((-8.2, 3.4, 2.4))
-LOOKS_AT = Vector((0.3, -1.0, 1.05))
+LOOKS_AT = Vector((0.3, -1.0, 1.35))
 
 
 def main() -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from sunsplit.core import ConversionSettings, convert, load
 
+from sunsplit.core import ConversionSettings, convert, load
 from tests.blender import (
     add_mapping,
     empty_world,
@@ -259,6 +259,10 @@ def break_ldr(scene):
     node(scene.world.node_tree, "TEX_ENVIRONMENT").image = image
 
 
+def break_colour_space(scene):
+    hdri_world_from_pixels(scene).image.colorspace_settings.name = "sRGB"
+
+
 def break_mirror_ball(scene):
     hdri_world_from_pixels(scene).projection = "MIRROR_BALL"
 
@@ -305,6 +309,7 @@ def break_two(scene):
         (break_missing, "cannot be loaded from /nowhere/missing.exr"),
         (break_square, "angular map"),
         (break_ldr, "LDR image"),
+        (break_colour_space, "numbers are not light"),
         (break_mirror_ball, "mirror ball"),
         (break_stretch, "stretched by its mapping"),
         (break_shift, "shifts the map's directions"),
@@ -412,3 +417,17 @@ def test_a_texture_inside_nested_groups(scene, two_suns):
     assert "Sunsplit: Residual" not in inner.nodes
     bpy.ops.sunsplit.restore()
     assert inventory() == things
+
+
+def test_one_undo_takes_it_back_and_redo_brings_it_again(scene, two_suns):
+    hdri_world(scene, two_suns)
+    world = scene.world.name
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.sunsplit.convert("EXEC_DEFAULT", True)
+    bpy.ops.ed.undo()
+    assert bpy.context.scene.world.name == world
+    assert bpy.context.scene.sunsplit.original_world is None
+    assert not bpy.data.lights
+    bpy.ops.ed.redo()
+    assert bpy.context.scene.world.name != world
+    assert len(suns(bpy.context.scene)) == 2

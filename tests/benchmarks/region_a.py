@@ -77,7 +77,7 @@ def measure(path: Path, folder: Path, width: int, samples: int, seeds: int) -> l
     facts = {}
     for seed in range(seeds):
         for row in ROWS:
-            scene = test_scene(path, width)
+            scene = columns_and_balls(path, width)
             facts[row] = set_up(scene, row)
             started = time.process_time()
             images[row].append(render(scene, folder, samples, seed))
@@ -94,7 +94,7 @@ def measure(path: Path, folder: Path, width: int, samples: int, seeds: int) -> l
     ]
 
 
-def test_scene(path: Path, width: int) -> bpy.types.Scene:
+def columns_and_balls(path: Path, width: int) -> bpy.types.Scene:
     """Columns, a ball and a glossy ball on a ground."""
     scene = fresh_scene()
     hdri_world(scene, path)

@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix, Vector
-from sunsplit.core import load, sphere
 
+from sunsplit.core import load, sphere
 from tests.blender import (
     add_mesh,
     ball_mesh,
@@ -78,6 +78,17 @@ def test_a_white_plate(tmp_path, hdri, normal):
     found = split.mean.mean(axis=(0, 1))
     print(f"closed form {expected}, split {found}, ratio - 1 {found / expected - 1}")
     assert found == pytest.approx(expected, rel=MEAN)
+
+
+@pytest.mark.parametrize("space", ["Non-Color", "ACEScg", "Linear Rec.2020"])
+def test_a_plate_under_a_map_in_another_colour_space(tmp_path, studio, space):
+    scene = fresh_scene()
+    hdri_world(scene, studio).image.colorspace_settings.name = space
+    add_mesh(scene, plate_mesh(1), diffuse("White", 0.8), Matrix())
+    camera_towards(scene, np.array([0, 0, -1]), 30, 48).location = (0, 0, 2)
+    plain = estimate(scene, tmp_path, 48)
+    bpy.ops.sunsplit.convert()
+    means_agree(plain, estimate(scene, tmp_path, 48), tmp_path)
 
 
 def add_columns(scene):
