@@ -1,5 +1,7 @@
 """The Blender side: settings, operators, panel. Everything heavy is imported when it is used."""
 
+import atexit
+
 import bpy
 
 from . import command, operators, panel, properties
@@ -18,9 +20,14 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.types.Scene.sunsplit = bpy.props.PointerProperty(type=properties.SunsplitSettings)
     command.register()
+    # Blender unregisters its add-ons when it ends. As a Python module it does not, and 4.5 then
+    # hangs or crashes over any operator or panel that is left.
+    if not bpy.app.binary_path:
+        atexit.register(unregister)
 
 
 def unregister() -> None:
+    atexit.unregister(unregister)
     command.unregister()
     del bpy.types.Scene.sunsplit
     for cls in reversed(CLASSES):

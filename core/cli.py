@@ -1,18 +1,22 @@
 """The command line: `sunsplit convert` and `sunsplit info`. Needs no Blender.
 
-Exit status: 0 done, 1 the input cannot be used, 2 wrong usage, 130 cancelled.
+Exit status: 0 done, 1 the input cannot be used or the output not written, 2 wrong usage,
+130 cancelled.
 """
 
 from __future__ import annotations
 
 import argparse
+import io
 import json
+import os
 import sys
 from collections.abc import Sequence
 from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from . import interrupts
 from .errors import SunsplitError
 from .progress import Progress, terminal_progress
 
@@ -26,24 +30,87 @@ CANCELLED = 130
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb and return the exit status."""
-    options = _parser().parse_args(arguments)
     try:
-        return options.run(options)
+        _print_any_name()
+        with interrupts.remembered():
+            status = _run(arguments)
+        # Here, where a reader that has left can be told from an error; not when Python ends.
+        if sys.stdout:
+            sys.stdout.flush()
+        return status
     except SunsplitError as error:
-        print(f"sunsplit: {error}", file=sys.stderr)
-        return 1
+        return _fail(str(error))
     except BrokenPipeError:
         # The reader of our output (head, less) has left; the files are written.
-        sys.stdout = None  # type: ignore[assignment]
+        _forget_stdout()
         return 0
-    except KeyboardInterrupt:
-        print("sunsplit: cancelled, nothing was written.", file=sys.stderr)
-        return CANCELLED
+    except OSError as error:
+        # Reading and writing files raise errors of ours: this is stdout itself.
+        _forget_stdout()
+        return _fail(f"cannot print the result: {error.strerror or error}.")
+    except MemoryError:
+        return _fail("there is not enough memory for this map.")
+    except KeyboardInterrupt as stop:
+        return _fail(f"cancelled, {str(stop) or 'nothing was written'}.", CANCELLED)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    try:
+        options = _parser().parse_args(arguments)
+    except SystemExit as end:  # argparse ends the program, and Blender with it
+        return int(end.code or 0)
+    return options.run(options)
+
+
+def _fail(sentence: str, status: int = 1) -> int:
+    print(f"sunsplit: {' '.join(sentence.split())}", file=sys.stderr)
+    return status
+
+
+def _print_any_name() -> None:
+    """File names may hold what the terminal's encoding lacks: escape it, do not stop at it."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _forget_stdout() -> None:
+    """Let Python's last flush go nowhere: it would fail again, and say so."""
+    try:
+        descriptor = sys.stdout.fileno()
+    except (AttributeError, OSError):  # none, or one of Python's own
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, descriptor)
+    os.close(nowhere)
+
+
+class _Version(argparse.Action):
+    """Prints the version; looks it up only when asked, which `--help` need not wait for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        print(f"sunsplit {_version()}")
+        parser.exit()
+
+
+def _version() -> str:
+    """From the add-on's manifest; a package that pip has installed has metadata instead."""
+    import tomllib
+    from importlib import metadata
+
+    manifest = Path(__file__).parent.parent / "blender_manifest.toml"
+    try:
+        return tomllib.loads(manifest.read_text(encoding="utf-8"))["version"]
+    except FileNotFoundError:
+        return metadata.version("sunsplit")
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="sunsplit", description="Split an HDRI into sun lamps and a calm residual map."
+    )
+    parser.add_argument(
+        "--version", action=_Version, nargs=0, help="show the version of Sunsplit and exit"
     )
     verbs = parser.add_subparsers(required=True, metavar="VERB")
     convert = verbs.add_parser(
@@ -129,10 +196,10 @@ def run_convert(options: argparse.Namespace) -> int:
         conversion = convert(environment, settings, _within(progress, 0.3, 0.8))
         progress("writing", 0.8)
         files = save(conversion, options.output, options.preview)
-    if options.json:
-        _print_json(conversion, files)
-    else:
-        _print_conversion(conversion, files)
+    try:
+        (_print_json if options.json else _print_conversion)(conversion, files)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("the files are written") from None
     return 0
 
 

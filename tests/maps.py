@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from sunsplit.core import sphere
 from sunsplit.core.environment import EnvironmentMap, environment_from_pixels
 

@@ -73,7 +73,7 @@ def describe(conversion: Conversion) -> dict[str, Any]:
         "suns": [lights_json.sun_as_dict(sun) for sun in conversion.suns],
         "residual": residual,
         "account": lights_json.account_as_dict(account),
-        "notes": list(conversion.notes),
+        "notes": [*environment.warnings, *conversion.notes],
     }
 
 

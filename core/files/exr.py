@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,66 +11,148 @@ from numpy.typing import NDArray
 from ..environment import scalar_irradiance
 from ..errors import CannotWrite, UnusableInput
 from ..tolerances import HALF_ENERGY, HALF_MAXIMUM
+from .exr_layers import Channel, Layer, choose_layer
+from .limits import MAXIMUM_PIXELS, refuse_absurd_size, too_large_for_memory
+from .quiet import quiet_libraries
 
 MAGIC = b"\x76\x2f\x31\x01"
 
-PREFERRED_LAYERS = ("", "Combined", "ViewLayer.Combined", "rgb", "RGB", "rgba", "RGBA", "beauty")
-"""Layers that hold the picture itself, by the habit of the programs that write them."""
+REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+
+Header = dict[str, Any]
+Window = tuple[NDArray[np.int64], NDArray[np.int64]]
+"""First and last pixel, each (x, y)."""
 
 
 def read(path: Path) -> tuple[NDArray[np.floating], list[str]]:
     """Pixels (height, width, 3) of the file's own type, and warnings for the user.
 
-    Takes the first part and layer that has R, G and B; a single channel (Y) counts as grey;
-    alpha and all other channels are ignored. Raises UnusableInput.
+    `exr_layers` says which channels are taken. Raises UnusableInput.
     """
+    headers = _read_headers(path)
+    layer, warnings = choose_layer(headers, path.name)
+    header = headers[layer.part]
+    _check_map(header, path.name)
+    pixels = np.stack(_read_planes(path, layer, header), axis=-1)
+    pixels, remarks = _in_display_window(pixels, header)
+    return pixels, [*warnings, *_colour_warnings(header), *remarks]
+
+
+def _read_headers(path: Path) -> list[Header]:
+    """Before the pixels: OpenEXR reads them all, and says nothing of those that it cannot read."""
     import OpenEXR
 
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
-            parts = [
-                ({n: c.pixels for n, c in part.channels.items()}, part.header)
-                for part in file.parts
-            ]
-    except (RuntimeError, ValueError, TypeError, MemoryError, OSError) as error:
+        with (
+            path.open("rb") as stream,
+            quiet_libraries(),
+            OpenEXR.File(stream, separate_channels=True, header_only=True) as file,
+        ):
+            # Copied, because closing the file empties its parts; and here, because OpenEXR
+            # decodes names when they are asked for, and damaged ones are no text.
+            headers = [_plain(part.header) for part in file.parts]
+    except (RuntimeError, ValueError, TypeError, KeyError, MemoryError, OSError) as error:
+        raise _damaged(path) from error
+    if not headers:
+        raise _damaged(path)
+    return headers
+
+
+def _plain(header: Header) -> Header:
+    channels = [Channel(c.name, max(c.xSampling, c.ySampling) > 1) for c in header["channels"]]
+    return header | {"channels": channels}
+
+
+def _damaged(path: Path) -> UnusableInput:
+    return UnusableInput(f"{path.name} is truncated or damaged: OpenEXR cannot read it.")
+
+
+def _check_map(header: Header, name: str) -> None:
+    import OpenEXR
+
+    refuse_absurd_size(name, *_size(_window(header, "dataWindow")))
+    if header.get("envmap") == OpenEXR.ENVMAP_CUBE:
         raise UnusableInput(
-            f"{path.name} cannot be read as OpenEXR; it is probably truncated or damaged "
-            f"({_one_line(error)})."
-        ) from error
-    for channels, header in parts:
-        planes = _colour_planes(channels)
-        if planes:
-            return np.stack(planes, axis=-1), _warnings(header)
-    names = ", ".join(sorted({name for channels, _ in parts for name in channels})) or "none"
-    raise UnusableInput(f"{path.name} has no colour channels (R, G, B or Y); it has: {names}.")
+            f"{name} states that it is a cube map: "
+            "convert it to an equirectangular (latitude-longitude) map first."
+        )
 
 
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
+def _read_planes(path: Path, layer: Layer, header: Header) -> list[NDArray]:
+    import OpenEXR
+
+    size = _size(_window(header, "dataWindow"))
+    try:
+        with (
+            # A stream, because OpenEXR takes no name that is not Unicode.
+            path.open("rb") as stream,
+            quiet_libraries() as remarks,
+            OpenEXR.File(stream, separate_channels=True) as file,
+        ):
+            found = {
+                name: channel.pixels
+                for part in file.parts
+                if part.part_index == layer.part
+                for name, channel in part.channels.items()
+            }
+    except MemoryError as error:
+        raise too_large_for_memory(path.name, *size) from error
+    except (RuntimeError, ValueError, TypeError, OSError) as error:
+        raise _damaged(path) from error
+    # OpenEXR leaves out what it could not read and says why in passing.
+    if "MemoryError" in remarks.getvalue():
+        raise too_large_for_memory(path.name, *size)
+    planes = [found.get(name) for name in layer.channels]
+    if any(plane is None or plane.shape != (size[1], size[0]) for plane in planes):
+        raise _damaged(path)
+    return planes
 
 
-def _colour_planes(channels: dict[str, NDArray]) -> list[NDArray] | None:
-    flat = {name: plane for name, plane in channels.items() if plane.ndim == 2}
-    for layer in _layers(flat):
-        prefix = f"{layer}." if layer else ""
-        for names in ("RGB", "rgb", ("red", "green", "blue"), "YYY", "yyy"):
-            wanted = [prefix + name for name in names]
-            subsampled = names in ("YYY", "yyy") and {prefix + "RY", prefix + "BY"} & set(flat)
-            if all(name in flat for name in wanted) and not subsampled:
-                return [flat[name] for name in wanted]
-    return None
+def _window(header: Header, name: str) -> Window:
+    first, last = header[name]
+    return np.asarray(first, dtype=np.int64), np.asarray(last, dtype=np.int64)
 
 
-def _layers(channels: dict[str, NDArray]) -> list[str]:
-    found = dict.fromkeys(name.rpartition(".")[0] for name in channels)
-    first = [layer for layer in PREFERRED_LAYERS if layer in found]
-    return first + [layer for layer in found if layer not in first]
+def _size(window: Window) -> tuple[int, int]:
+    width, height = window[1] - window[0] + 1
+    return int(width), int(height)
 
 
-def _warnings(header: dict) -> list[str]:
+def _in_display_window(
+    pixels: NDArray[np.floating], header: Header
+) -> tuple[NDArray[np.floating], list[str]]:
+    """Pixels of the whole picture: the display window is the frame, the data window may be a crop.
+
+    Except where the header says `envmap` (then the data window is the map, by OpenEXR's rules) or
+    where the display window can be no map.
+    """
+    data, display = _window(header, "dataWindow"), _window(header, "displayWindow")
+    if "envmap" in header or all(np.array_equal(a, b) for a, b in zip(data, display, strict=True)):
+        return pixels, []
+    width, height = _size(display)
+    if width != 2 * height or not 0 < width * height <= MAXIMUM_PIXELS:
+        return pixels, ["The display window is no map: the data window is taken as the whole map."]
+    whole = np.zeros((height, width, 3), pixels.dtype)
+    first, last = np.maximum(data[0], display[0]), np.minimum(data[1], display[1])
+    if (first <= last).all():
+        columns, rows = (slice(a, b + 1) for a, b in zip(first, last, strict=True))
+        whole[_moved(rows, display[0][1]), _moved(columns, display[0][0])] = pixels[
+            _moved(rows, data[0][1]), _moved(columns, data[0][0])
+        ]
+    own_width, own_height = _size(data)
+    return whole, [
+        f"The file's {own_width} x {own_height} pixels do not lie where its {width} x {height} "
+        "display window does: what is missing is black, what is outside is left out."
+    ]
+
+
+def _moved(part: slice, origin: int) -> slice:
+    return slice(int(part.start - origin), int(part.stop - origin))
+
+
+def _colour_warnings(header: Header) -> list[str]:
     stated = header.get("chromaticities")
-    rec709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-    if stated is None or np.allclose(np.ravel(stated), rec709, atol=2e-3):
+    if stated is None or np.allclose(np.ravel(stated), REC709, atol=2e-3):
         return []
     return ["The file states primaries other than Rec.709; its numbers are taken as they are."]
 
@@ -86,7 +169,7 @@ def is_half_enough(radiance: NDArray[np.float32]) -> bool:
 def write(path: Path, radiance: NDArray[np.float32]) -> None:
     """Write a map as half floats where they are enough, else as float32; ZIP.
 
-    radiance: (height, width, 3), linear Rec.709.
+    radiance: (height, width, 3), linear Rec.709. Raises CannotWrite.
     """
     import OpenEXR
 
@@ -94,12 +177,18 @@ def write(path: Path, radiance: NDArray[np.float32]) -> None:
     header = {
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
-        "chromaticities": (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290),
+        "chromaticities": REC709,
     }
     try:
-        with OpenEXR.File(header, {"RGB": np.ascontiguousarray(stored)}) as file:
-            file.write(str(path))
-    except RuntimeError as error:
+        # Python's own stream says what is wrong, a full disk above all, and takes every name.
+        with (
+            path.open("wb") as stream,
+            quiet_libraries(),
+            OpenEXR.File(header, {"RGB": np.ascontiguousarray(stored)}) as file,
+        ):
+            file.write(stream)
+    except (OSError, RuntimeError) as error:
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
         raise CannotWrite(
-            f"Cannot write {path.parent}: {_one_line(error)}. Nothing was changed."
+            f"Cannot write into {path.parent}: {reason}. Nothing was changed."
         ) from error

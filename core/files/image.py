@@ -1,53 +1,93 @@
-"""Every image that is not OpenEXR, Radiance .hdr first, read by OpenImageIO."""
+"""Images that OpenImageIO reads: Radiance's pixels, float TIFF, and LDR pictures if allowed."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UnusableInput
+from .limits import refuse_absurd_size, too_large_for_memory
+from .quiet import quiet_libraries
+
+if TYPE_CHECKING:
+    from OpenImageIO import ImageInput
 
 
-def read(path: Path, allow_ldr: bool) -> NDArray[np.float32]:
+def read(path: Path, allow_ldr: bool, upright: bool = True) -> NDArray[np.float32]:
     """Pixels (height, width, 3), linear. Raises UnusableInput.
 
     allow_ldr: take images of 8 or 16 bits too, undoing the sRGB curve.
+    upright: undo an Exif orientation; False: pixels as they are stored.
     """
-    import OpenImageIO as oiio
-
-    source = oiio.ImageInput.open(str(path))
-    if source is None:
-        oiio.geterror()
-        raise UnusableInput(
-            f"{path.name} is not an image that can be read here: give an .exr or .hdr map."
-        )
-    try:
-        spec = source.spec()
-        linear = spec.format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
-        if not linear and not allow_ldr:
-            raise UnusableInput(
-                f"{path.name} is an LDR image ({spec.format} values, no linear light): use the "
-                "HDR version of the map, or --allow-ldr to take it as sRGB."
-            )
-        pixels = source.read_image(oiio.FLOAT)
-        problem = source.geterror()
-    finally:
-        source.close()
-    if pixels is None or problem:
-        reason = " ".join(problem.split()) or "its pixels end too early"
-        raise UnusableInput(f"{path.name} is truncated or damaged ({reason}).")
-    colour = _upright(pixels, spec.getattribute("Orientation") or 1)
-    colour = colour[..., [0, 0, 0]] if spec.nchannels < 3 else colour[..., :3]
+    with quiet_libraries():
+        source = _open(path)
+        try:
+            linear = _check(source, path.name, allow_ldr)
+            pixels = _read_pixels(source, path.name)
+            spec = source.spec()
+        finally:
+            source.close()
+    if upright:
+        pixels = _upright(pixels, spec.getattribute("Orientation") or 1)
+    colour = pixels[..., [0, 0, 0]] if spec.nchannels < 3 else pixels[..., :3]
     return np.ascontiguousarray(colour if linear else _from_srgb(colour))
 
 
+def _open(path: Path) -> ImageInput:
+    import OpenImageIO as oiio
+
+    try:
+        source = oiio.ImageInput.open(str(path))
+    except TypeError as error:
+        raise UnusableInput(f"{path.name} has a name that is not Unicode: rename it.") from error
+    if source is None:
+        oiio.geterror()  # else OpenImageIO prints it when the program ends
+        raise UnusableInput(
+            f"{path.name} is not an image that can be read here, or its header is damaged: "
+            "give an .exr or .hdr map."
+        )
+    return source
+
+
+def _check(source: ImageInput, name: str, allow_ldr: bool) -> bool:
+    """Whether an image holds linear light. Raises UnusableInput for one that must not be read."""
+    import OpenImageIO as oiio
+
+    spec = source.spec()
+    refuse_absurd_size(name, spec.width, spec.height)
+    linear = spec.format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
+    if not linear and not allow_ldr:
+        raise UnusableInput(
+            f"{name} is an LDR image ({spec.format} values, no linear light): use the "
+            "HDR version of the map, or --allow-ldr to take it as sRGB."
+        )
+    return linear
+
+
+def _read_pixels(source: ImageInput, name: str) -> NDArray[np.float32]:
+    import OpenImageIO as oiio
+
+    spec = source.spec()
+    try:
+        pixels = source.read_image(oiio.FLOAT)
+    except MemoryError as error:
+        raise too_large_for_memory(name, spec.width, spec.height) from error
+    problem = source.geterror()
+    if pixels is None or problem:
+        reason = (problem.splitlines() or ["its pixels end too early"])[0].strip()
+        raise UnusableInput(f"{name} is truncated or damaged ({reason}).")
+    return pixels
+
+
 def _upright(pixels: NDArray[np.float32], orientation: int) -> NDArray[np.float32]:
-    """Undo an Exif orientation, which is how OpenImageIO reports a .hdr file's scan order."""
+    """Undo an Exif orientation."""
     if orientation >= 5:
         pixels = pixels.swapaxes(0, 1)
-    # 2 and 3 run leftwards, 3 and 4 upwards; 5 to 8 are those, transposed.
+    # Stored rows and columns run, as seen: 2 and 3 leftwards, 3 and 4 upwards; 6 and 7 leftwards,
+    # 7 and 8 upwards once their rows and columns have changed places.
     leftwards, upwards = {2: (1, 0), 3: (1, 1), 4: (0, 1), 6: (1, 0), 7: (1, 1), 8: (0, 1)}.get(
         orientation, (0, 0)
     )

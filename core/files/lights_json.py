@@ -59,6 +59,7 @@ def read(path: Path) -> tuple[dict[str, Any], tuple[Sun, ...], Account]:
     try:
         suns = tuple(_sun(entry) for entry in document["suns"])
         account = Account(*(np.array(document["account"][k]) for k in _ACCOUNT_PARTS))
+        document["residual"]  # may be null, but must be there
     except (KeyError, TypeError, ValueError) as error:
         raise UnusableInput(f"{path.name} is damaged: {error!r} in its suns or account.") from error
     return document, suns, account

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
@@ -18,6 +16,9 @@ WIDTH = 1280
 
 REGION = (255, 64, 200)
 SUN = (255, 225, 0)
+MARKER = (14, 24)
+"""The four lines around a sun's centre begin and end so many pixels from it."""
+
 PAPER, INK = (24, 24, 27), (235, 235, 235)
 
 
@@ -29,8 +30,10 @@ def draw_preview(conversion: Conversion) -> Image.Image:
     picture.paste(REGION, mask=_outline(conversion.strata.region_a))
     draw = ImageDraw.Draw(picture)
     font = ImageFont.load_default(15)
+    for sun in conversion.suns:
+        _draw_sun(draw, sun)
     for rank, sun in reversed(list(enumerate(conversion.suns, start=1))):
-        _draw_sun(draw, sun, str(rank), font)
+        _draw_name(draw, sun, str(rank), font)  # above all circles, the brightest on top
     lines = _legend(conversion)
     sheet = Image.new("RGB", (WIDTH, WIDTH // 2 + 22 * len(lines) + 16), PAPER)
     sheet.paste(picture)
@@ -45,7 +48,8 @@ def tone_mapped(radiance: NDArray[np.float32]) -> NDArray[np.uint8]:
     lum = luminance(radiance)
     lit = lum[lum > 0]
     middle = float(np.median(lit)) if lit.size else 1.0
-    exposed = radiance * np.float64(0.18 / middle)
+    # In float64 by name: numpy 1.26 would stay in float32 and overflow at a bright sun.
+    exposed = np.multiply(radiance, 0.18 / middle, dtype=np.float64)
     bright = (lum * (0.18 / middle))[..., None]
     # Reinhard's curve on luminance keeps colours; the clip afterwards only touches pure lights.
     mapped = np.clip(exposed * 1.4 / (1 + bright), 0, 1)
@@ -69,16 +73,28 @@ def _outline(region: NDArray[np.bool_]) -> Image.Image:
     return Image.fromarray(binary_dilation(inside, iterations=2) & ~inside)
 
 
-def _draw_sun(draw: ImageDraw.ImageDraw, sun: Sun, name: str, font: ImageFont.FreeTypeFont) -> None:
+def _draw_sun(draw: ImageDraw.ImageDraw, sun: Sun) -> None:
     u, v = sphere.to_image(sphere.circle(sun.to_light, sun.angular_diameter / 2))
-    points = np.stack([u * WIDTH, v * WIDTH / 2], axis=-1)
-    for start, end in pairwise(points):
-        if abs(start[0] - end[0]) < WIDTH / 2:  # not the piece that jumps over the seam
-            draw.line([tuple(start), tuple(end)], SUN, 2)
-    (x,), (y,) = (np.atleast_1d(a) for a in sphere.to_image(sun.to_light))
-    x, y = x * WIDTH, y * WIDTH / 2
-    for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        draw.line([(x + 14 * dx, y + 14 * dy), (x + 24 * dx, y + 24 * dy)], SUN, 2)
+    # Without jumps, and drawn again one width to either side: what leaves at the seam comes back.
+    circle = np.stack([np.unwrap(u, period=1) * WIDTH, v * WIDTH / 2], axis=-1)
+    centre = np.array(_place(sun))
+    for turn in (-WIDTH, 0, WIDTH):
+        draw.line([(x + turn, y) for x, y in circle], SUN, 2)
+        for step in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+            ends = [centre + (turn, 0) + reach * np.array(step) for reach in MARKER]
+            draw.line([tuple(end) for end in ends], SUN, 2)
+
+
+def _place(sun: Sun) -> tuple[float, float]:
+    """Where a sun's centre lies in the picture."""
+    u, v = sphere.to_image(sun.to_light)
+    return float(u) * WIDTH, float(v) * WIDTH / 2
+
+
+def _draw_name(
+    draw: ImageDraw.ImageDraw, sun: Sun, name: str, font: ImageFont.FreeTypeFont
+) -> None:
+    x, y = _place(sun)
     left = x + 45 > WIDTH
     anchor = ("r" if left else "l") + ("a" if y < 40 else "d")
     place = (x - 10 if left else x + 10, y + 10 if y < 40 else y - 10)
@@ -87,9 +103,11 @@ def _draw_sun(draw: ImageDraw.ImageDraw, sun: Sun, name: str, font: ImageFont.Fr
 
 def _legend(conversion: Conversion) -> list[tuple[tuple[int, int, int], str]]:
     environment, account = conversion.environment, conversion.account
+    # A file's name may hold bytes that are no text, and those cannot be drawn.
+    name = environment.name.encode(errors="replace").decode()
     all_light = account.source @ LUMINANCE_WEIGHTS
     lines = [
-        (INK, f"{environment.name}   {environment.width} x {environment.height}"),
+        (INK, f"{name}   {environment.width} x {environment.height}"),
         (REGION, f"Outline: region A, {conversion.strata.share:.1%} of all light"),
         (SUN, f"Circles: {_suns(conversion)}, {account.share:.1%} of all light, true size"),
     ]

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from sunsplit.core import sphere
 from sunsplit.core.cells import Cell, split
 from sunsplit.core.environment import scalar_irradiance
 from sunsplit.core.suns import disc_sun
-
 from tests.maps import direction, disc_energy, paint_disc, painted_radius, sky
 
 

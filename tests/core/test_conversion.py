@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from sunsplit.core import ConversionSettings, convert, load, sphere
 from sunsplit.core.settings import BadSetting
 from sunsplit.core.tolerances import ACCOUNT, EQUIVARIANCE
-
 from tests.maps import direction, disc_energy, environment, paint_disc, painted_radius, sky
 
 WIDTH = 64

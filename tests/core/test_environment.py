@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from sunsplit.core.environment import environment_from_pixels, luminance, scalar_irradiance
 from sunsplit.core.errors import UnusableInput
-
 from tests.maps import disc_energy, environment, paint_disc, sky
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sunsplit.core import sphere
 
+from sunsplit.core import sphere
 from tests.maps import direction
 
 

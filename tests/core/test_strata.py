@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from sunsplit.core import sphere
 from sunsplit.core.strata import CALM, calm_threshold, stratify
-
 from tests.maps import environment, sky
 
 

@@ -1,0 +1,21 @@
+"""What no honest file exceeds: damaged headers promise anything."""
+
+from __future__ import annotations
+
+from ..errors import UnusableInput
+
+MAXIMUM_PIXELS = 2**31
+"""65,536 x 32,768, twice as wide as the largest maps that are sold."""
+
+
+def refuse_absurd_size(name: str, width: int, height: int) -> None:
+    """Raise UnusableInput before anyone asks for memory for it."""
+    if width < 1 or height < 1 or width * height > MAXIMUM_PIXELS:
+        raise UnusableInput(
+            f"{name} is damaged or no map: its header promises {width} x {height} pixels."
+        )
+
+
+def too_large_for_memory(name: str, width: int, height: int) -> UnusableInput:
+    """The error for a size that may be honest, but not on this machine."""
+    return UnusableInput(f"{name}, {width} x {height} pixels, does not fit into memory.")
