@@ -18,9 +18,10 @@ from .trace import Place, lighting_textures
 TAG = "sunsplit"
 """Custom property on every data-block that a conversion makes, so that restore finds it again."""
 
-CALM_ENOUGH = 4.0
+CALM_ENOUGH = 2.5
 """Second moment of a residual, mean(L^2) / mean(L)^2 over the sphere, up to which sampling by
-surfaces alone (world importance sampling NONE) has at least as little noise as a table."""
+surfaces alone (world importance sampling NONE) costs no more than a table; this and the next
+bounds by docs/benchmarks/region_a.md."""
 
 LINEAR_SPACES = ("Linear ", "Non-Color", "ACEScg", "ACES2065-1", "scene_linear")
 """How the names of colour spaces begin in which numbers are light."""
@@ -28,7 +29,7 @@ LINEAR_SPACES = ("Linear ", "Non-Color", "ACEScg", "ACES2065-1", "scene_linear")
 SMALL_TABLE = 512
 """Width of the sampling table for a residual that is calm, but not calm enough to do without."""
 
-CALM_PEAK = 200.0
+CALM_PEAK = 1000.0
 """Brightest pixel in means of the residual up to which a small table misses nothing that counts."""
 
 
@@ -199,7 +200,7 @@ def _set_sampling(world: bpy.types.World, residual: NDArray[np.float32] | None) 
         world.cycles.sampling_method = "NONE"
         return
     moment, peak = contrast(residual)
-    if moment <= CALM_ENOUGH:
+    if moment <= CALM_ENOUGH and peak <= CALM_PEAK:
         world.cycles.sampling_method = "NONE"
     elif peak <= CALM_PEAK:
         world.cycles.sampling_method = "MANUAL"

@@ -6,7 +6,11 @@
 from __future__ import annotations
 
 import argparse
+import os
+import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
@@ -28,21 +32,42 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("out"))
     options = parser.parse_args()
     folder = options.output.resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    log = folder / "blender.log"
+    sys.stdout.reconfigure(line_buffering=True)
     print(f"1. Converting {options.hdri.name} on the command line")
     if sunsplit_command(["convert", str(options.hdri), "-o", str(folder), "--preview"]):
         raise SystemExit(1)
     print(f"2. Rendering the sample scene in Blender {bpy.app.version_string} with Cycles")
-    scene = open_scene(options.hdri, options.width, options.samples)
-    before = render(scene, folder / "before")
-    bpy.ops.sunsplit.convert()
-    after = render(scene, folder / "after")
-    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "converted.blend"), compress=True)
+    with blender_talks_to(log):
+        scene = open_scene(options.hdri, options.width, options.samples)
+        before, seconds_before = render(scene, folder / "before")
+        bpy.ops.sunsplit.convert()
+        after, seconds_after = render(scene, folder / "after")
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / "converted.blend"), compress=True)
+    print(f"   before {seconds_before:.1f} s, after {seconds_after:.1f} s")
     strip = folder / "before, after, difference.png"
     side_by_side(folder, before, after).save(strip)
     print("3. Result")
     report(before, after, scene)
-    for path in (folder / "before.png", folder / "after.png", strip, folder / "converted.blend"):
+    names = ("before.png", "after.png", strip.name, "converted.blend", log.name)
+    for path in (folder / name for name in names):
         print(f"   {path}")
+
+
+@contextmanager
+def blender_talks_to(log: Path) -> Iterator[None]:
+    """Blender's own lines about every sample go into a file."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    with log.open("wb") as file:
+        os.dup2(file.fileno(), 1)
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        os.dup2(kept, 1)
+        os.close(kept)
 
 
 def open_scene(hdri: Path, width: int, samples: int) -> bpy.types.Scene:
@@ -57,17 +82,17 @@ def open_scene(hdri: Path, width: int, samples: int) -> bpy.types.Scene:
     return scene
 
 
-def render(scene: bpy.types.Scene, path: Path) -> np.ndarray:
-    """Render once; write a picture to look at and give the linear pixels."""
+def render(scene: bpy.types.Scene, path: Path) -> tuple[np.ndarray, float]:
+    """Render once and write a picture to look at; the linear pixels, and how long it took."""
     settings = scene.render.image_settings
     settings.file_format, settings.color_depth = "OPEN_EXR", "32"
     scene.render.filepath = str(path.with_suffix(".exr"))
     started = time.perf_counter()
     bpy.ops.render.render(write_still=True)
-    print(f"   {path.name}: {time.perf_counter() - started:.1f} s")
+    seconds = time.perf_counter() - started
     settings.file_format, settings.color_depth = "PNG", "8"
     bpy.data.images["Render Result"].save_render(str(path.with_suffix(".png")), scene=scene)
-    return exr.read(path.with_suffix(".exr"))[0].astype(np.float64)
+    return exr.read(path.with_suffix(".exr"))[0].astype(np.float64), seconds
 
 
 def side_by_side(folder: Path, before: np.ndarray, after: np.ndarray) -> Image.Image:

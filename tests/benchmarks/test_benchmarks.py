@@ -16,5 +16,5 @@ def test_region_a(tmp_path, monkeypatch, sunrise):
     assert len(rows) == len(region_a.ROWS) - 1
     share = {row[1].strip(): float(row[2]) for row in rows}
     # The lower the border, the more light is in the suns.
-    assert share["calm 300, NONE"] < share["calm 30, NONE"] < share["calm 10, NONE"]
+    assert share["calm 100, NONE"] < share["calm 30, NONE"] < share["calm 10, NONE"]
     assert share["calm 30, as set"] == share["calm 30, 512"]
