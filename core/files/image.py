@@ -37,7 +37,12 @@ def read(path: Path, allow_ldr: bool, upright: bool = True) -> NDArray[np.float3
 
 
 def _open(path: Path) -> ImageInput:
-    import OpenImageIO as oiio
+    try:
+        import OpenImageIO as oiio
+    except ImportError as error:  # there is no wheel for Windows on ARM
+        raise UnusableInput(
+            f"{path.name} needs OpenImageIO, which is not installed here: give an .exr map."
+        ) from error
 
     try:
         source = oiio.ImageInput.open(str(path))
