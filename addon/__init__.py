@@ -28,6 +28,8 @@ def register() -> None:
 
 def unregister() -> None:
     atexit.unregister(unregister)
+    if not hasattr(bpy.types.Scene, "sunsplit"):
+        return  # Blender disables an extension when it ends, after what `register` has asked for.
     command.unregister()
     del bpy.types.Scene.sunsplit
     for cls in reversed(CLASSES):

@@ -156,6 +156,22 @@ def test_a_rough_ball_in_the_real_map(tmp_path, sunrise):
     pixels_agree(plain, split, tmp_path, slack=0.05)
 
 
+def test_light_through_glass_onto_a_ground(tmp_path):
+    """Caustics: a diffuse ray that meets the sun behind glass is one more kind of ray."""
+    pixels = sky(256, 0.3)
+    paint_disc(pixels, direction(30, 60), 6, (200, 150, 100))
+    scene = fresh_scene()
+    hdri_world(scene, write_map(tmp_path / "map.exr", pixels))
+    add_mesh(scene, plate_mesh(3), diffuse("Ground", 0.8), Matrix())
+    glass = material("Glass", (1, 1, 1), **BALLS["glass"])
+    add_mesh(scene, ball_mesh(0.7), glass, Matrix.Translation((0, 0, 0.75)))
+    camera = camera_towards(scene, np.array([0, 0.5, -1]) / np.sqrt(1.25), 45, 48)
+    camera.location = (0, -2.2, 4.4)
+    plain = estimate(scene, tmp_path, 256)
+    bpy.ops.sunsplit.convert()
+    means_agree(plain, estimate(scene, tmp_path, 256), tmp_path)
+
+
 def test_the_camera_sees_the_original_map(tmp_path, studio):
     scene = fresh_scene()
     hdri_world(scene, studio)
