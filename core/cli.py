@@ -12,7 +12,6 @@ import json
 import os
 import sys
 from collections.abc import Sequence
-from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,7 +21,6 @@ from .progress import Progress, terminal_progress
 
 if TYPE_CHECKING:  # imported where they are used: `--help` must not wait for scipy
     from .conversion import Conversion
-    from .environment import EnvironmentMap
     from .files.conversion import WrittenFiles
 
 CANCELLED = 130
@@ -182,6 +180,7 @@ def run_convert(options: argparse.Namespace) -> int:
     from .conversion import convert
     from .files.conversion import save
     from .files.maps import load
+    from .report import conversion_lines
     from .settings import ConversionSettings
 
     settings = ConversionSettings(
@@ -197,7 +196,10 @@ def run_convert(options: argparse.Namespace) -> int:
         progress("writing", 0.8)
         files = save(conversion, options.output, options.preview)
     try:
-        (_print_json if options.json else _print_conversion)(conversion, files)
+        if options.json:
+            _print_json(conversion, files)
+        else:
+            print("\n".join(conversion_lines(conversion, files)))
     except KeyboardInterrupt:
         raise KeyboardInterrupt("the files are written") from None
     return 0
@@ -207,6 +209,7 @@ def run_info(options: argparse.Namespace) -> int:
     from .conversion import convert
     from .files.conversion import describe
     from .files.maps import load
+    from .report import info_lines
     from .settings import ConversionSettings
 
     with terminal_progress() as progress:
@@ -215,75 +218,13 @@ def run_info(options: argparse.Namespace) -> int:
         conversion = convert(
             environment, ConversionSettings(residual="none"), _within(progress, 0.3, 1.0)
         )
-    if options.json:
-        print(json.dumps(describe(conversion)))
-        return 0
-    _print_map(environment)
-    print(f"brightest pixel {_contrast(conversion):,.0f} times the mean luminance")
-    _print_suns(conversion)
+    print(json.dumps(describe(conversion)) if options.json else "\n".join(info_lines(conversion)))
     return 0
 
 
 def _within(progress: Progress, start: float, end: float) -> Progress:
     """A listener for a part of the whole work."""
     return lambda stage, fraction: progress(stage, start + (end - start) * fraction)
-
-
-def _contrast(conversion: Conversion) -> float:
-    from .environment import LUMINANCE_WEIGHTS
-
-    mean = conversion.account.source @ LUMINANCE_WEIGHTS / (4 * pi)
-    return float(conversion.strata.luminance.max() / mean)
-
-
-def _print_map(environment: EnvironmentMap) -> None:
-    print(f"{environment.file}: {environment.width} x {environment.height}")
-    if environment.repairs.pixels:
-        added = environment.repaired_share
-        print(f"repaired pixels: {environment.repairs} (light changed by {added:.3%})")
-    for warning in environment.warnings:
-        print(f"warning: {warning}")
-
-
-def _print_suns(conversion: Conversion) -> None:
-    import numpy as np
-
-    from .environment import LUMINANCE_WEIGHTS
-
-    all_light = conversion.account.source @ LUMINANCE_WEIGHTS
-    noun = "sun" if len(conversion.suns) == 1 else "suns"
-    print(f"{len(conversion.suns)} {noun} with {conversion.account.share:.1%} of all light")
-    for rank, sun in enumerate(conversion.suns, start=1):
-        part = sun.scalar_irradiance @ LUMINANCE_WEIGHTS / all_light
-        x, y, z = sun.to_light
-        elevation = np.degrees(np.arctan2(z, np.hypot(x, y)))
-        azimuth = np.degrees(np.arctan2(y, x)) % 360
-        print(
-            f"  {rank:3d}  {part:7.2%}  azimuth {azimuth:6.2f}°  elevation {elevation:+6.2f}°"
-            f"  {np.degrees(sun.angular_diameter):6.2f}° wide"
-        )
-    for note in conversion.notes:
-        print(note)
-
-
-def _print_conversion(conversion: Conversion, files: WrittenFiles) -> None:
-    _print_map(conversion.environment)
-    _print_suns(conversion)
-    computed = conversion.account.relative_error.max()
-    line = f"account: suns + residual = source within {computed:.1e}"
-    if files.residual is None:
-        print(f"no residual map: {1 - conversion.account.share:.1%} of all light is left out")
-    else:
-        print(f"{line}; read again from the files {_reread(files):.1e}")
-    for path in (files.lights, files.residual, files.preview):
-        if path:
-            print(f"wrote {path}")
-
-
-def _reread(files: WrittenFiles) -> float:
-    from .files.conversion import account_of_files
-
-    return float(account_of_files(files.lights).relative_error.max())
 
 
 def _print_json(conversion: Conversion, files: WrittenFiles) -> None:

@@ -13,7 +13,7 @@ from .cells import Cell
 from .environment import EnvironmentMap
 from .placement.groups import WIDEST_DISC, cut_misfits
 from .progress import Progress, silent
-from .residual import split_by_label, surroundings
+from .residual import surroundings
 from .settings import ConversionSettings
 from .strata import Strata, stratify
 from .suns import Sun, disc_sun
@@ -78,7 +78,7 @@ def bright_groups(environment: EnvironmentMap, strata: Strata) -> list[Cell]:
     flux = excess * solid[pixels // width, None]
     groups = [
         Cell.of(group, flux[np.searchsorted(pixels, group)], width, height)
-        for group in split_by_label(labels, count)
+        for group in sphere.group_pixels(labels, count)
     ]
     return [group for group in groups if group.total > 0]
 

@@ -25,7 +25,7 @@ def surroundings(radiance: NDArray[np.float32], region: NDArray[np.bool_]) -> ND
     labels, count = sphere.connected_groups(region)
     pixels = np.flatnonzero(region)
     result = np.zeros((len(pixels), 3), np.float32)
-    for group in split_by_label(labels, count):
+    for group in sphere.group_pixels(labels, count):
         near = sphere.neighbours(group, width, height)
         outside = ~region.ravel()[near]
         if not outside.any():
@@ -35,16 +35,6 @@ def surroundings(radiance: NDArray[np.float32], region: NDArray[np.bool_]) -> ND
         inside = np.searchsorted(pixels, group)
         result[inside] = np.minimum(smooth.astype(np.float32), flat[group])
     return result
-
-
-def split_by_label(labels: NDArray[np.int32], count: int) -> list[NDArray[np.intp]]:
-    """Flat indices, rising, of the pixels of each label from 1 to count."""
-    if not count:
-        return []
-    pixels = np.flatnonzero(labels)
-    owner = labels.ravel()[pixels]
-    ends = np.cumsum(np.bincount(owner, minlength=count + 1)[1:])
-    return np.split(pixels[np.argsort(owner, kind="stable")], ends[:-1])
 
 
 def _harmonic(

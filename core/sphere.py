@@ -158,6 +158,16 @@ def connected_groups(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int32], int]:
     return component[labels].astype(np.int32), joined - 1
 
 
+def group_pixels(labels: NDArray[np.int32], count: int) -> list[NDArray[np.intp]]:
+    """Flat indices, rising, of the pixels of each label from 1 to count."""
+    if not count:
+        return []
+    pixels = np.flatnonzero(labels)
+    owner = labels.ravel()[pixels]
+    ends = np.cumsum(np.bincount(owner, minlength=count + 1)[1:])
+    return np.split(pixels[np.argsort(owner, kind="stable")], ends[:-1])
+
+
 def _pole_pairs(row: NDArray[np.integer]) -> NDArray[np.integer]:
     lit = row[row > 0]
     return np.stack([lit[:-1], lit[1:]], axis=-1) if len(lit) else np.empty((0, 2), row.dtype)
