@@ -34,6 +34,8 @@ class SUNSPLIT_OT_convert(bpy.types.Operator):
         except SunsplitError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        for name in CHOICES:  # Adjust Last Operation shows what was used
+            setattr(self, name, getattr(settings, name))
         self.report({"INFO"}, result.headline)
         return {"FINISHED"}
 

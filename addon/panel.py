@@ -1,6 +1,11 @@
 """The tab "Sunsplit" in the sidebar of the 3D view."""
 
+import textwrap
+
 import bpy
+
+CHARACTER = 6.5
+"""Width of a character of Blender's interface font in pixels at scale 1, on average and a bit."""
 
 
 class SUNSPLIT_PT_main(bpy.types.Panel):
@@ -21,8 +26,16 @@ class SUNSPLIT_PT_main(bpy.types.Panel):
             self.layout.operator("sunsplit.restore", icon="LOOP_BACK")
         if settings.report:
             box = self.layout.box().column(align=True)
-            for line in settings.report.splitlines():
-                box.label(text=line)
+            for sentence in settings.report.splitlines():
+                for line in textwrap.wrap(sentence, _characters(context)):
+                    box.label(text=line)
+
+
+def _characters(context: bpy.types.Context) -> int:
+    """How many fit into a line of the panel: labels do not wrap, they lose their middle."""
+    margins = 60
+    width = context.region.width / context.preferences.system.ui_scale - margins
+    return max(int(width / CHARACTER), 20)
 
 
 class SUNSPLIT_PT_settings(bpy.types.Panel):

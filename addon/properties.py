@@ -14,11 +14,15 @@ from ..core.settings import ConversionSettings
 
 DEFAULTS = ConversionSettings()
 
+# As arguments of the operator they are not remembered: the scene's settings are.
+_FRESH: set[str] = {"SKIP_SAVE"}
+
 CHOICES = {
     "lights": IntProperty(
         name="Lights",
         description="At most so many sun lamps; fainter lights stay in the world",
         default=DEFAULTS.lights,
+        options=_FRESH,
         min=1,
         soft_max=64,
     ),
@@ -26,11 +30,13 @@ CHOICES = {
         name="Automatic Share",
         description="Find the bright region by itself: whole lights with their halo",
         default=True,
+        options=_FRESH,
     ),
     "share": FloatProperty(
         name="Share",
         description="Part of all light in the bright region that becomes lamps",
         default=0.5,
+        options=_FRESH,
         min=0.001,
         max=1.0,
         subtype="FACTOR",
@@ -39,6 +45,7 @@ CHOICES = {
         name="Strata",
         description="Levels of brightness that the map is cut into (an even number)",
         default=DEFAULTS.strata,
+        options=_FRESH,
         min=2,
         step=2,
         soft_max=16,
@@ -51,6 +58,7 @@ CHOICES = {
             ("none", "Nothing", "Lamps only: the rest of the light is left out"),
         ],
         default=DEFAULTS.residual,
+        options=_FRESH,
     ),
 }
 """The settings of a conversion, once: for the scene and as arguments of the operator."""
