@@ -7,6 +7,7 @@ import bpy
 from . import command, operators, panel, properties
 
 CLASSES = (
+    properties.SunsplitLamp,
     properties.SunsplitSettings,
     operators.SUNSPLIT_OT_convert,
     operators.SUNSPLIT_OT_restore,

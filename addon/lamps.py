@@ -10,32 +10,44 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from ..core.suns import Sun
-from .world import TAG, WorldLight
+from .trace import TAG
+from .world import WorldLight
 
 COLLECTION = "Sunsplit Suns"
 
 
-def add_lamps(
-    scene: bpy.types.Scene, suns: Sequence[Sun], light: WorldLight
-) -> bpy.types.Collection:
-    """One lamp for each sun, aimed and tinted as the world shows the map."""
+def make_lamps(
+    suns: Sequence[Sun], light: WorldLight, world: bpy.types.World
+) -> list[bpy.types.Object]:
+    """One lamp for each sun, aimed and tinted as the world shows the map; in no collection yet.
+
+    What the world does to rays of each kind, its lamps do too.
+    """
+    lamps = []
+    for sun in suns:
+        data = _lamp_data(sun.irradiance * light.gain, sun.angular_diameter)
+        lamp = bpy.data.objects.new(data.name, data)
+        lamp[TAG] = True
+        _aim(lamp, light.map_from_world.T @ sun.to_light)
+        _set_visibility(lamp, world)
+        lamps.append(lamp)
+    return lamps
+
+
+def link_lamps(scene: bpy.types.Scene, lamps: Sequence[bpy.types.Object]) -> bpy.types.Collection:
+    """Put lamps into a new collection of a scene, named by their rank."""
     collection = bpy.data.collections.new(COLLECTION)
     collection[TAG] = True
     scene.collection.children.link(collection)
-    for rank, sun in enumerate(suns, start=1):
-        name = f"Sunsplit Sun {rank}"
-        data = _lamp_data(name, sun.irradiance * light.gain, sun.angular_diameter)
-        lamp = bpy.data.objects.new(name, data)
-        lamp[TAG] = True
-        _aim(lamp, light.map_from_world.T @ sun.to_light)
-        _set_visibility(lamp)
+    for rank, lamp in enumerate(lamps, start=1):
+        lamp.name = lamp.data.name = f"Sunsplit Sun {rank}"
         collection.objects.link(lamp)
     return collection
 
 
-def _lamp_data(name: str, irradiance: NDArray[np.float64], diameter: float) -> bpy.types.Light:
+def _lamp_data(irradiance: NDArray[np.float64], diameter: float) -> bpy.types.Light:
     """A sun lamp of this normal irradiance, (3,), and angular diameter; nothing left to chance."""
-    data = bpy.data.lights.new(name, "SUN")
+    data = bpy.data.lights.new("Sunsplit Sun", "SUN")
     data[TAG] = True
     strength = float(irradiance.max())
     data.energy = strength
@@ -47,9 +59,6 @@ def _lamp_data(name: str, irradiance: NDArray[np.float64], diameter: float) -> b
     data.use_shadow = True
     data.diffuse_factor = data.specular_factor = data.transmission_factor = 1.0
     data.volume_factor = 1.0
-    # Without it no glossy ray meets the disc, and a mirror shows no sun.
-    data.cycles.use_multiple_importance_sampling = True
-    data.cycles.max_bounces = 1024
     return data
 
 
@@ -59,33 +68,60 @@ def _aim(lamp: bpy.types.Object, to_light: NDArray[np.float64]) -> None:
     lamp.rotation_quaternion = Vector(to_light).to_track_quat("Z", "Y")
 
 
-def _set_visibility(lamp: bpy.types.Object) -> None:
+def _set_visibility(lamp: bpy.types.Object, world: bpy.types.World) -> None:
     """The camera sees the sun in the original map, every other ray in the lamp: once each."""
     lamp.visible_camera = False
-    lamp.visible_diffuse = True
-    lamp.visible_glossy = True
-    lamp.visible_transmission = True
-    lamp.visible_volume_scatter = True
+    lamp.lightgroup = world.lightgroup
+    if not hasattr(world, "cycles"):  # Cycles is switched off
+        return
+    # Without it no glossy ray meets the disc, and a mirror shows no sun.
+    lamp.data.cycles.use_multiple_importance_sampling = True
+    lamp.data.cycles.max_bounces = world.cycles.max_bounces
+    rays = world.cycles_visibility
+    lamp.visible_diffuse = rays.diffuse
+    lamp.visible_glossy = rays.glossy
+    lamp.visible_transmission = rays.transmission
+    lamp.visible_volume_scatter = rays.scatter
 
 
-def remove_lamps(scene: bpy.types.Scene, collection: bpy.types.Collection | None) -> None:
-    """Remove a conversion's lamps, also those that the user has moved to other collections."""
-    mine = set(scene.objects) | (set(collection.objects) if collection else set())
-    for lamp in [thing for thing in mine if thing.get(TAG)]:
+def remove_lamps(lamps: Sequence[bpy.types.Object]) -> None:
+    """Remove lamps that no scene uses any more."""
+    for lamp in lamps:
         data = lamp.data
-        bpy.data.objects.remove(lamp)
-        if data.users == 0:
-            bpy.data.lights.remove(data)
-    if collection is not None:
-        _remove_collection(scene, collection)
+        if lamp.users == 0:
+            bpy.data.objects.remove(lamp)
+            if data.users == 0:
+                bpy.data.lights.remove(data)
 
 
-def _remove_collection(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
-    """Remove it; what the user has put into it moves to the scene."""
+def unlink_lamps(
+    scene: bpy.types.Scene,
+    collection: bpy.types.Collection | None,
+    lamps: Sequence[bpy.types.Object],
+) -> None:
+    """Take a conversion's lamps out of a scene, wherever the user has put them.
+
+    What the user has put into the lamps' collection moves to the scene.
+    """
+    if collection is not None and collection.name in scene.collection.children:
+        _move_out(scene, collection, lamps)
+        scene.collection.children.unlink(collection)
+    for holder in (scene.collection, *scene.collection.children_recursive):
+        for lamp in lamps:
+            if lamp.name in holder.objects:
+                holder.objects.unlink(lamp)
+    if collection is not None and collection.users == 0:
+        bpy.data.collections.remove(collection)
+
+
+def _move_out(
+    scene: bpy.types.Scene,
+    collection: bpy.types.Collection,
+    lamps: Sequence[bpy.types.Object],
+) -> None:
     for thing in collection.objects:
-        if thing.name not in scene.collection.objects:
+        if thing not in lamps and thing.name not in scene.collection.objects:
             scene.collection.objects.link(thing)
     for child in collection.children:
         if child.name not in scene.collection.children:
             scene.collection.children.link(child)
-    bpy.data.collections.remove(collection)

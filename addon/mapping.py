@@ -7,7 +7,7 @@ import numpy as np
 from mathutils import Euler, Matrix, Vector
 from numpy.typing import NDArray
 
-from .trace import Place, cannot_follow, constant, source_of
+from .trace import Input, Place, cannot_follow, constant, ends_at
 
 Matrix3 = NDArray[np.float64]
 
@@ -34,10 +34,13 @@ def _rigid(node: bpy.types.Node, matrix: Matrix3) -> Matrix3:
     raise cannot_follow(node, "is stretched by its mapping")
 
 
-def _vector(at: object, texture: bpy.types.Node) -> Matrix3:
-    output = source_of(at)
-    if output is None:
-        return np.eye(3)
+def _vector(at: Input, texture: bpy.types.Node) -> Matrix3:
+    end = ends_at(at)
+    if end.socket == texture.inputs["Vector"]:
+        return np.eye(3)  # a texture without coordinates takes the direction of the ray
+    if isinstance(end, Input):
+        raise cannot_follow(end.socket.node, "has nothing linked to its Vector")
+    output = end
     place, node = output.place, output.socket.node
     if node.type == "TEX_COORD":
         plain = output.socket.identifier == "Generated" or (

@@ -23,21 +23,29 @@ class SUNSPLIT_OT_convert(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        from .scene import convert_scene
+        from .scene import convert_scene, settings_for
 
-        settings = context.scene.sunsplit
-        for name in CHOICES:
-            if self.properties.is_property_set(name):
-                setattr(settings, name, getattr(self, name))
+        chosen = self._chosen(context.scene.sunsplit)
         try:
-            result = convert_scene(context.scene)
+            result = convert_scene(context.scene, settings_for(**chosen))
         except SunsplitError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        for name in CHOICES:  # Adjust Last Operation shows what was used
-            setattr(self, name, getattr(settings, name))
+        for name, value in chosen.items():
+            setattr(context.scene.sunsplit, name, value)
+            setattr(self, name, value)  # Adjust Last Operation shows what was used
         self.report({"INFO"}, result.headline)
         return {"FINISHED"}
+
+    def _chosen(self, scene_settings: bpy.types.PropertyGroup) -> dict[str, object]:
+        """The scene's settings, and before them what was given as an argument."""
+        given = {name for name in CHOICES if self.properties.is_property_set(name)}
+        chosen = {
+            name: getattr(self if name in given else scene_settings, name) for name in CHOICES
+        }
+        if "share" in given and "share_auto" not in given:
+            chosen["share_auto"] = False
+        return chosen
 
 
 class SUNSPLIT_OT_restore(bpy.types.Operator):
@@ -49,7 +57,7 @@ class SUNSPLIT_OT_restore(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.scene.sunsplit.original_world is None:
+        if not context.scene.sunsplit.is_converted:
             cls.poll_message_set("This scene's world is not converted")
             return False
         return True

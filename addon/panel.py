@@ -17,7 +17,7 @@ class SUNSPLIT_PT_main(bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         settings = context.scene.sunsplit
-        converted = settings.original_world is not None
+        converted = settings.is_converted
         column = self.layout.column()
         column.scale_y = 1.6
         text = "Convert Again" if converted else "Convert World"

@@ -3,6 +3,7 @@
 import bpy
 from bpy.props import (
     BoolProperty,
+    CollectionProperty,
     EnumProperty,
     FloatProperty,
     IntProperty,
@@ -64,6 +65,12 @@ CHOICES = {
 """The settings of a conversion, once: for the scene and as arguments of the operator."""
 
 
+class SunsplitLamp(bpy.types.PropertyGroup):
+    """One lamp of a conversion: known by itself, not by a name or mark that a copy has too."""
+
+    __annotations__ = {"lamp": PointerProperty(type=bpy.types.Object)}
+
+
 class SunsplitSettings(bpy.types.PropertyGroup):
     """Settings of the next conversion, and what the last one has made."""
 
@@ -77,7 +84,13 @@ class SunsplitSettings(bpy.types.PropertyGroup):
         "collection": PointerProperty(
             type=bpy.types.Collection, name="Suns", description="What holds the lamps"
         ),
+        "lamps": CollectionProperty(type=SunsplitLamp),
         "report": StringProperty(
             name="Report", description="What the last conversion did, a sentence a line"
         ),
     }
+
+    @property
+    def is_converted(self) -> bool:
+        """Whether there is a conversion to restore, even where the user has removed parts."""
+        return bool(self.original_world or self.converted_world or self.collection)

@@ -9,8 +9,18 @@ import bpy
 from ..core.conversion import Conversion, convert
 from ..core.errors import UnusableInput
 from ..core.settings import ConversionSettings
-from .lamps import add_lamps, remove_lamps
-from .world import converted_world, find_light, read_image, remove_converted
+from .lamps import link_lamps, make_lamps, remove_lamps, unlink_lamps
+from .trace import TAG
+from .world import (
+    WorldLight,
+    converted_world,
+    find_light,
+    is_animated,
+    name_residual,
+    read_image,
+    remove_converted,
+    unconverted,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,39 +38,76 @@ class SceneConversion:
         return f"{count} {noun} with {self.conversion.account.share:.1%} of all light"
 
 
-def chosen_settings(scene: bpy.types.Scene) -> ConversionSettings:
-    """The settings of `scene.sunsplit` as the core wants them."""
-    chosen = scene.sunsplit
-    share = None if chosen.share_auto else float(chosen.share)
+def settings_for(
+    lights: int, share_auto: bool, share: float, strata: int, residual: str
+) -> ConversionSettings:
+    """The values of the panel as the core wants them."""
     return ConversionSettings(
-        lights=chosen.lights,
-        share=share,
+        lights=lights,
+        share=None if share_auto else float(share),
         # The slider can stop at an odd number; the next even one is meant.
-        strata=chosen.strata + chosen.strata % 2,
-        residual="none" if share == 1 else chosen.residual,
+        strata=strata + strata % 2,
+        residual="none" if share == 1 and not share_auto else residual,
     )
 
 
-def convert_scene(scene: bpy.types.Scene) -> SceneConversion:
-    """Replace a scene's world and add lamps; a scene already converted starts from its original.
+def convert_scene(scene: bpy.types.Scene, settings: ConversionSettings) -> SceneConversion:
+    """Replace a scene's world and add lamps.
 
-    Raises UnusableInput and leaves the scene as it was.
+    A converted world is converted again as the user has left it, turned or with another map;
+    what Restore brings back stays the world that there was first. A world that the user has
+    chosen instead becomes the new original. Raises UnusableInput; then, and whatever else goes
+    wrong, the scene is as it was.
     """
-    state = scene.sunsplit
-    original = state.original_world or scene.world
-    if original is None:
+    state, world = scene.sunsplit, scene.world
+    if world is None:
         raise UnusableInput("The scene has no world: add one with an HDRI first.")
-    light = find_light(original)
-    conversion = convert(read_image(light.image), chosen_settings(scene))
-    # Nothing of the scene has been touched up to here: whatever was wrong has been said.
+    again = world == state.converted_world and state.original_world is not None
+    if world.get(TAG) and not again:
+        raise UnusableInput(
+            f'The world "{world.name}" is already converted, by another scene or file: '
+            "restore it there, or choose the original world."
+        )
+    light = find_light(world, scene.render.engine)
+    conversion = convert(read_image(light.image), settings)
+    original = state.original_world if again else world
+    sentences = [*_sentences(conversion), *_warnings(scene, world, original, light)]
+    new = converted_world(world, light, conversion.residual)
+    lamps = make_lamps(conversion.suns, light, world)
+    # From here on `light` must not be used: its nodes go with the world that is replaced.
     restore_scene(scene)
-    state.original_world = original
-    scene.world = converted_world(original, light, conversion.residual)
-    state.converted_world = scene.world
-    state.collection = add_lamps(scene, conversion.suns, light)
-    result = SceneConversion(conversion, scene.world, state.collection)
-    state.report = "\n".join([result.headline, *_sentences(conversion)])
+    name_residual(new, conversion.environment.name)
+    result = _install(scene, original, conversion, new, lamps)
+    state.report = "\n".join([result.headline, *sentences])
     return result
+
+
+def _install(
+    scene: bpy.types.Scene,
+    original: bpy.types.World,
+    conversion: Conversion,
+    world: bpy.types.World,
+    lamps: list[bpy.types.Object],
+) -> SceneConversion:
+    """Give a scene its converted world and lamps; the names are free by now."""
+    state = scene.sunsplit
+    world.name = f"{original.name} (Sunsplit)"
+    state.original_world, state.converted_world = original, world
+    scene.world = world
+    _swap_overrides(scene, original, world)
+    for lamp in lamps:
+        state.lamps.add().lamp = lamp
+    state.collection = link_lamps(scene, lamps)
+    return SceneConversion(conversion, world, state.collection)
+
+
+def _swap_overrides(
+    scene: bpy.types.Scene, old: bpy.types.World, new: bpy.types.World | None
+) -> None:
+    """View layers that override the world with the same world follow it."""
+    for layer in scene.view_layers:
+        if layer.world_override == old:
+            layer.world_override = new
 
 
 def _sentences(conversion: Conversion) -> list[str]:
@@ -73,16 +120,45 @@ def _sentences(conversion: Conversion) -> list[str]:
     return [*lines, *conversion.notes]
 
 
+def _warnings(
+    scene: bpy.types.Scene,
+    world: bpy.types.World,
+    original: bpy.types.World,
+    light: WorldLight,
+) -> list[str]:
+    lines = []
+    if is_animated(world, light):
+        lines.append(
+            f"The world is animated: the lamps stay as they are at frame {scene.frame_current}."
+        )
+    for layer in scene.view_layers:
+        if layer.world_override not in (None, world, original):
+            lines.append(
+                f'View layer "{layer.name}" has a world of its own: '
+                "there, the lamps are added to that world's light."
+            )
+    return lines
+
+
 def restore_scene(scene: bpy.types.Scene) -> None:
-    """Bring back the original world and remove all that the conversion made."""
+    """Bring back the original world and remove all that the conversion made.
+
+    A world that the user has chosen meanwhile stays. What another scene uses too stays there.
+    """
     state = scene.sunsplit
-    if state.original_world is None:
-        return
-    # A world that the user has chosen meanwhile is the user's: it stays.
-    if scene.world == state.converted_world or scene.world is None:
-        scene.world = state.original_world
-    remove_lamps(scene, state.collection)
-    if state.converted_world is not None:
-        remove_converted(state.converted_world)
+    converted, collection = state.converted_world, state.collection
+    original = state.original_world
+    lamps = [entry.lamp for entry in state.lamps if entry.lamp]
+    if original is None and converted is not None:
+        original = unconverted(converted)
+    if converted is not None:
+        if scene.world == converted:
+            scene.world = original
+        _swap_overrides(scene, converted, original)
     state.original_world = state.converted_world = state.collection = None
+    state.lamps.clear()
     state.report = ""
+    unlink_lamps(scene, collection, lamps)
+    remove_lamps(lamps)
+    if converted is not None and converted != original:
+        remove_converted(converted)

@@ -14,7 +14,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.environment import LUMINANCE_WEIGHTS
 from ..core.errors import UnusableInput
+
+TAG = "sunsplit"
+"""Custom property of every data-block and node that a conversion makes."""
 
 Stack = tuple[bpy.types.Node, ...]
 """The group nodes that a node lies in, outermost first."""
@@ -67,12 +71,16 @@ def cannot_follow(node: bpy.types.Node, why: str) -> UnusableInput:
     )
 
 
-def lighting_textures(world: bpy.types.World) -> list[Contribution]:
-    """Every environment texture that lights the scene, several paths to one added up."""
+def lighting_textures(world: bpy.types.World, engine: str = "CYCLES") -> list[Contribution]:
+    """Every environment texture that lights the scene, several paths to one added up.
+
+    engine: of the scene, as a world may have an output for each.
+    """
     tree = world.node_tree
     # From Blender 5 on every world uses nodes, and asking whether it does is deprecated.
     uses_nodes = tree is not None and (bpy.app.version >= (5, 0) or world.use_nodes)
-    output = tree.get_output_node("CYCLES") if uses_nodes else None
+    target = "EEVEE" if "EEVEE" in engine else "CYCLES"
+    output = tree.get_output_node(target) if uses_nodes else None
     if output is None:
         raise UnusableInput(
             f'The world "{world.name}" uses no nodes: give it an Environment Texture first.'
@@ -90,13 +98,13 @@ def lighting_textures(world: bpy.types.World) -> list[Contribution]:
 def source_of(start: Input) -> Output | None:
     """The output that feeds an input, through reroutes, muted nodes and group borders.
 
-    None when nothing does; `constant_source` then tells whose value counts.
+    None when nothing does; then the value of the socket where the chain ends counts.
     """
-    end = _ends_at(start)
+    end = ends_at(start)
     return end if isinstance(end, Output) else None
 
 
-def _ends_at(at: Input) -> Output | Input:
+def ends_at(at: Input) -> Output | Input:
     """Where a chain of links ends: at an output that makes a value, or at an unlinked input."""
     while at.socket.is_linked and not at.socket.links[0].is_muted:
         output = Output(at.socket.links[0].from_socket, at.stack)
@@ -168,6 +176,12 @@ def _colour(at: Input) -> Iterator[Contribution]:
     place, kind = output.place, output.socket.node.type
     if kind == "TEX_ENVIRONMENT":
         yield Contribution(place, np.ones(3))
+    elif place.node.get(TAG):
+        # The mix of an earlier conversion: what lights is what it shows the camera.
+        yield from _colour(place.input(7))
+    elif kind == "HUE_SAT" and _only_scales(place):
+        gain = constant(place.input("Value"))
+        yield from (replace(part, gain=part.gain * gain) for part in _colour(place.input("Color")))
     elif kind in ("MIX", "MIX_RGB"):
         yield from _mixed(place)
     elif kind == "VECT_MATH":
@@ -199,6 +213,16 @@ def _has_values(place: Place, wanted: dict[str, float]) -> bool:
     )
 
 
+def _only_scales(place: Place) -> bool:
+    """Whether a Hue/Saturation/Value node leaves hue and saturation and is fully on."""
+    sockets = {s.identifier: Input(s, place.stack) for s in place.node.inputs}
+    neutral = {"Hue": 0.5, "Saturation": 1, "Fac": 1}
+    return all(
+        name in sockets and np.allclose(constant(sockets[name]), value)
+        for name, value in neutral.items()
+    )
+
+
 def _is_zero(at: Input) -> bool:
     return source_of(at) is None and not constant(at).any()
 
@@ -221,15 +245,19 @@ def _mixed(place: Place) -> Iterator[Contribution]:
             raise cannot_follow(node, "mixes something other than colours")
         factor, first, second = (place.input(index) for index in (0, 6, 7))
         clamped = node.clamp_result
+        limited = node.clamp_factor
     else:
         factor, first, second = (place.input(index) for index in (0, 1, 2))
         clamped = node.use_clamp
+        limited = True
     sides = list(_colour(first)), list(_colour(second))
     if not any(sides):
         return
     if clamped:
         raise cannot_follow(node, "clamps the map")
     weight = float(constant(factor)[0])
+    if limited:
+        weight = min(max(weight, 0.0), 1.0)
     for is_first in (True, False):
         parts = sides[0 if is_first else 1]
         others, other = (sides[1], second) if is_first else (sides[0], first)
@@ -275,7 +303,16 @@ def constant(at: Input) -> NDArray[np.float64]:
 
     Raises UnusableInput when it depends on anything but Light Path > Is Camera Ray.
     """
-    end = _ends_at(at)
+    end = ends_at(at)
+    value = _value(end)
+    if at.socket.type == "VALUE" and end.socket.type == "RGBA":
+        return np.full(3, value @ LUMINANCE_WEIGHTS)  # as renderers make a number of a colour
+    if at.socket.type == "VALUE" and end.socket.type == "VECTOR":
+        return np.full(3, value.mean())
+    return value
+
+
+def _value(end: Input | Output) -> NDArray[np.float64]:
     if isinstance(end, Input):
         return _as_three(end.socket.default_value)
     place, node = end.place, end.socket.node

@@ -11,26 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.environment import EnvironmentMap, environment_from_pixels
-from ..core.errors import UnusableInput
+from ..core.errors import CannotWrite, UnusableInput
+from ..core.sampling import choose_sampling
 from .mapping import map_from_world
-from .trace import Place, lighting_textures
-
-TAG = "sunsplit"
-"""Custom property on every data-block that a conversion makes, so that restore finds it again."""
-
-CALM_ENOUGH = 2.5
-"""Second moment of a residual, mean(L^2) / mean(L)^2 over the sphere, up to which sampling by
-surfaces alone (world importance sampling NONE) costs no more than a table; this and the next
-bounds by docs/benchmarks/region_a.md."""
+from .trace import TAG, Place, lighting_textures
 
 LINEAR_SPACES = ("Linear ", "Non-Color", "ACEScg", "ACES2065-1", "scene_linear")
 """How the names of colour spaces begin in which numbers are light."""
-
-SMALL_TABLE = 512
-"""Width of the sampling table for a residual that is calm, but not calm enough to do without."""
-
-CALM_PEAK = 1000.0
-"""Brightest pixel in means of the residual up to which a small table misses nothing that counts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +37,9 @@ class WorldLight:
         return self.texture.node.image
 
 
-def find_light(world: bpy.types.World) -> WorldLight:
-    """The one environment texture that lights a world. Raises UnusableInput."""
-    found = lighting_textures(world)
+def find_light(world: bpy.types.World, engine: str = "CYCLES") -> WorldLight:
+    """The one environment texture that lights a world under an engine. Raises UnusableInput."""
+    found = lighting_textures(world, engine)
     if not found:
         raise UnusableInput(
             f'No environment texture lights the world "{world.name}": '
@@ -81,6 +68,10 @@ def read_image(image: bpy.types.Image) -> EnvironmentMap:
     """
     if image.source in ("SEQUENCE", "MOVIE", "TILED"):
         raise UnusableInput(f'"{image.name}" is a {image.source.lower()}: use a single image.')
+    if image.type == "MULTILAYER":
+        raise UnusableInput(
+            f'"{image.name}" is a multilayer EXR: save its combined pass as a plain EXR first.'
+        )
     width, height = image.size
     if not image.has_data and not width * height:
         raise UnusableInput(
@@ -104,17 +95,21 @@ def read_image(image: bpy.types.Image) -> EnvironmentMap:
     return environment_from_pixels(colour, Path(image.name).stem, image.name)
 
 
-def residual_image(residual: NDArray[np.float32], name: str) -> bpy.types.Image:
-    """A residual map as an image that travels inside the .blend file."""
+def residual_image(residual: NDArray[np.float32]) -> bpy.types.Image:
+    """A residual map as an image that travels inside the .blend file. Raises CannotWrite."""
     from ..core.files import exr
 
-    with tempfile.TemporaryDirectory(prefix="sunsplit-") as folder:
-        path = Path(folder) / f"{name}.residual.exr"
-        exr.write(path, residual)
-        image = bpy.data.images.load(str(path))
-        # Our own writer and Blender's packing keep the values; Image.save() would encode them.
-        image.pack()
-    image.name = f"{name} residual"
+    try:
+        with tempfile.TemporaryDirectory(prefix="sunsplit-") as folder:
+            path = Path(folder) / "residual.exr"
+            exr.write(path, residual)
+            image = bpy.data.images.load(str(path))
+            # Our own writer and Blender's packing keep the values; Image.save() would encode them.
+            image.pack()
+    except OSError as error:
+        raise CannotWrite(
+            f"Cannot write the residual map into a temporary folder: {error.strerror}."
+        ) from error
     image.filepath_raw = ""
     image.colorspace_settings.name = _working_space()
     image[TAG] = True
@@ -130,24 +125,40 @@ def _working_space() -> str:
 def converted_world(
     world: bpy.types.World, light: WorldLight, residual: NDArray[np.float32] | None
 ) -> bpy.types.World:
-    """A copy of a world in which all rays but the camera's see the residual (None: black)."""
+    """A copy of a world in which all rays but the camera's see the residual (None: black).
+
+    world: what `light` was found in; when it is a converted one, the copy loses what that
+    conversion has put in. Nothing is left behind when this fails.
+    """
     new = world.copy()
-    new.name = f"{world.name} (Sunsplit)"
     new[TAG] = True
-    tree = new.node_tree
-    for outer in light.texture.stack:
-        group = tree.nodes[outer.name]
-        group.node_tree = group.node_tree.copy()
-        group.node_tree[TAG] = True
-        tree = group.node_tree
-    image = None
-    if residual is not None:
-        image = residual_image(residual, Path(light.image.name).stem)
-    _insert_residual(tree, tree.nodes[light.texture.node.name], image)
-    _set_sampling(new, residual)
+    try:
+        tree = new.node_tree
+        for outer in light.texture.stack:
+            group = tree.nodes[outer.name]
+            group.node_tree = group.node_tree.copy()
+            group.node_tree[TAG] = True
+            tree = group.node_tree
+        _strip(tree)
+        image = residual_image(residual) if residual is not None else None
+        _insert_residual(tree, tree.nodes[light.texture.node.name], image)
+        _set_sampling(new, residual)
+    except BaseException:
+        remove_converted(new)
+        raise
     # EEVEE would take a second sun out of the residual.
     new.sun_threshold = 0.0
     return new
+
+
+def _strip(tree: bpy.types.NodeTree) -> None:
+    """Take out the nodes that a conversion has put into a tree."""
+    for mix in [node for node in tree.nodes if node.get(TAG) and node.type == "MIX"]:
+        source = mix.inputs[7].links[0].from_socket
+        for socket in [link.to_socket for link in mix.outputs[2].links]:
+            tree.links.new(source, socket)
+    for node in [node for node in tree.nodes if node.get(TAG)]:
+        tree.nodes.remove(node)
 
 
 def _insert_residual(
@@ -163,6 +174,7 @@ def _insert_residual(
     path = tree.nodes.new("ShaderNodeLightPath")
     path.name = path.label = "Sunsplit: Ray"
     path.location = texture.location.x, texture.location.y + 320
+    mix[TAG] = path[TAG] = True
     tree.links.new(path.outputs["Is Camera Ray"], mix.inputs[0])
     tree.links.new(texture.outputs["Color"], mix.inputs[7])
     mix.inputs[6].default_value = (0, 0, 0, 1)
@@ -179,6 +191,7 @@ def _texture_like(
     """An environment texture with another image and the same mapping."""
     rest = tree.nodes.new("ShaderNodeTexEnvironment")
     rest.name = rest.label = "Sunsplit: Residual"
+    rest[TAG] = True
     rest.location = texture.location.x, texture.location.y - 300
     rest.image = image
     rest.interpolation = texture.interpolation
@@ -195,35 +208,49 @@ def _texture_like(
 
 
 def _set_sampling(world: bpy.types.World, residual: NDArray[np.float32] | None) -> None:
-    """Cycles' world importance sampling: none or a small table where the residual is calm."""
-    if residual is None:
-        world.cycles.sampling_method = "NONE"
+    """Cycles' world importance sampling; nothing to do where Cycles is switched off."""
+    if not hasattr(world, "cycles"):
         return
-    moment, peak = contrast(residual)
-    if moment <= CALM_ENOUGH and peak <= CALM_PEAK:
-        world.cycles.sampling_method = "NONE"
-    elif peak <= CALM_PEAK:
-        world.cycles.sampling_method = "MANUAL"
-        world.cycles.sample_map_resolution = SMALL_TABLE
-    else:
-        world.cycles.sampling_method = "AUTOMATIC"
+    sampling = choose_sampling(residual)
+    world.cycles.sampling_method = sampling.method
+    if sampling.method == "MANUAL":
+        world.cycles.sample_map_resolution = sampling.resolution
 
 
-def contrast(radiance: NDArray[np.float32]) -> tuple[float, float]:
-    """(mean(L^2) / mean(L)^2, max(L) / mean(L)) of a map's luminance over the sphere."""
-    from ..core.environment import luminance
-    from ..core.sphere import row_solid_angles
-
-    lum = luminance(radiance)
-    solid = row_solid_angles(lum.shape[1], lum.shape[0]) / (4 * np.pi)
-    mean = float(lum.sum(axis=1) @ solid)
-    if mean == 0:
-        return 1.0, 1.0
-    return float((lum**2).sum(axis=1) @ solid) / mean**2, float(lum.max()) / mean
+def is_animated(world: bpy.types.World, light: WorldLight) -> bool:
+    """Whether keyframes or drivers may change what was read from the world's nodes."""
+    trees = [world.node_tree, *(outer.node_tree for outer in light.texture.stack)]
+    data = [thing.animation_data for thing in (world, *trees) if thing.animation_data]
+    return any(one.action or len(one.drivers) for one in data)
 
 
 def remove_converted(world: bpy.types.World) -> None:
-    """Take a converted world away, with the groups and the image that were made for it."""
+    """Take a converted world away, with the groups and images that were made for it.
+
+    What another scene still uses stays.
+    """
+    if world.users:
+        return
+    trees, images = _made_for(world)
+    bpy.data.worlds.remove(world)
+    for tree in trees:
+        if tree.users == 0:
+            bpy.data.node_groups.remove(tree)
+    for image in images:
+        if image.users == 0:
+            bpy.data.images.remove(image)
+
+
+def name_residual(world: bpy.types.World, map_name: str) -> None:
+    """Name the residual image after the map; once an older one of that name is gone."""
+    for image in _made_for(world)[1]:
+        image.name = f"{map_name} residual"
+
+
+def _made_for(
+    world: bpy.types.World,
+) -> tuple[list[bpy.types.NodeTree], list[bpy.types.Image]]:
+    """Groups and images that a conversion has made for a world."""
     trees, images = [world.node_tree], []
     for tree in trees:
         for node in tree.nodes:
@@ -231,11 +258,14 @@ def remove_converted(world: bpy.types.World) -> None:
                 trees.append(node.node_tree)
             elif node.type == "TEX_ENVIRONMENT" and node.image and node.image.get(TAG):
                 images.append(node.image)
-    # Groups before images: a data-block that still has a user is not ours to remove.
-    bpy.data.worlds.remove(world)
-    for tree in trees[1:]:
-        if tree.users == 0:
-            bpy.data.node_groups.remove(tree)
-    for image in images:
-        if image.users == 0:
-            bpy.data.images.remove(image)
+    return list(dict.fromkeys(trees[1:])), list(dict.fromkeys(images))
+
+
+def unconverted(world: bpy.types.World) -> bpy.types.World:
+    """A converted world whose original is lost, turned back into an ordinary one, in place."""
+    trees = [world.node_tree]
+    for tree in trees:
+        _strip(tree)
+        trees += [n.node_tree for n in tree.nodes if n.type == "GROUP" and n.node_tree]
+    del world[TAG]
+    return world

@@ -57,7 +57,9 @@ def _sun_lines(conversion: Conversion) -> list[str]:
 
 def _account_line(conversion: Conversion, files: WrittenFiles) -> str:
     if files.residual is None:
-        return f"no residual map: {1 - conversion.account.share:.1%} of all light is left out"
+        return (
+            f"no residual map: {max(1 - conversion.account.share, 0):.1%} of all light is left out"
+        )
     computed = conversion.account.relative_error.max()
     again = account_of_files(files.lights).relative_error.max()
     return (

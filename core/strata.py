@@ -17,8 +17,8 @@ from .environment import EnvironmentMap, luminance
 CALM = 30.0
 """A calm map's brightest pixel, in means of that map. Above it, light is worth a lamp.
 
-Measured with Cycles (README, "How region A is chosen"): from about 30 on, what is left can be
-rendered without the world's importance sampling; lower thresholds add area, not energy.
+Measured with Cycles (docs/benchmarks/region_a.md): above 30, noise stays in the map; below it,
+lamps gather halo and grow, and their penumbrae with them.
 """
 
 
@@ -67,7 +67,7 @@ def stratify(environment: EnvironmentMap, share: float | None, count: int) -> St
         threshold = calm_threshold(lum, solid)
         return Strata(lum, np.array([threshold]), 1 - _part_below(threshold, lum, solid))
     levels = _Levels.of(lum, solid)
-    threshold = calm_threshold(lum, solid) if share is None else levels.bound(1 - share)
+    threshold = calm_threshold(lum, solid) if share is None else levels.bound_of_share(share)
     below = levels.below(threshold)
     half = count // 2
     dark = [levels.bound(below * k / half) for k in range(1, half)]
@@ -116,6 +116,14 @@ class _Levels:
         nearest = int(np.argmin(np.abs(with_nothing - part)))
         # "-1" lies below every level: nothing is at or below it, black pixels included.
         return float(self.value[nearest - 1]) if nearest else -1.0
+
+    def bound_of_share(self, share: float) -> float:
+        """The level above which `share` of all light lies: one level at least, but never all of
+        a map that has only one."""
+        nearest = self.bound(1 - share)
+        if nearest == self.value[-1] and len(self.value) > 1:
+            return float(self.value[-2])
+        return nearest
 
     def below(self, threshold: float) -> float:
         """Part of all light at and below a luminance."""

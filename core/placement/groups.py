@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Sequence
 from math import hypot
 
@@ -24,28 +23,61 @@ WIDEST_DISC = np.radians(45)
 """Wider cells are cut whatever it brings: a lamp of 74 degrees made a picture 29 % wrong."""
 
 
-def cut_misfits(groups: Sequence[Cell], lights: int, all_light: float) -> list[Cell]:
-    """Cells from groups: where one disc is a bad stand-in and two are better, a group is cut in
-    two, the worst first, while there are fewer than `lights` cells.
+def cut_misfits(
+    groups: Sequence[Cell],
+    lights: int,
+    all_light: float,
+    widest: float = WIDEST_DISC,
+    keep_all: bool = False,
+) -> tuple[list[Cell], list[Cell]]:
+    """At most `lights` cells from groups, and the cells for which there was no light left.
 
-    all_light: luminance of the map's scalar irradiance. Returns the cells, brightest first.
+    Where one disc is a bad stand-in and two are better, a cell is cut in two, the worst first.
+    When all lights are taken, the faintest cell makes room as long as what the cut repairs is
+    more than that cell gives. Both lists are sorted, brightest first.
+
+    all_light: luminance of the map's scalar irradiance. widest: angular diameter in radians above
+    which a cell is cut whatever it brings. keep_all: no cell may make room for another, as there
+    is no residual that would take its light.
     """
-    done: list[Cell] = []
-    # The running number keeps equal misfits in a fixed order: results are the same on every run.
-    open_cells = [(-group.misfit(), number, group) for number, group in enumerate(groups)]
-    heapq.heapify(open_cells)
-    number = len(open_cells)
-    while open_cells and len(done) + len(open_cells) < lights:
-        badness, _, cell = heapq.heappop(open_cells)
-        misfit = -badness
-        parts = split(cell) if misfit > ALLOWED_MISFIT * all_light else ()
-        misfits = [part.misfit() for part in parts]
-        narrow = cell.angular_diameter <= WIDEST_DISC
-        if not parts or (narrow and hypot(*misfits) > GAIN_OF_A_CUT * misfit):
-            done.append(cell)
+    cells = list(groups)
+    misfits = [_badness(cell, all_light, widest) for cell in cells]
+    left_out: list[Cell] = []
+    while cells:
+        worst = int(np.argmax(misfits))
+        if misfits[worst] <= 0:
+            break
+        if not (len(cells) < lights or keep_all):
+            faintest = min(range(len(cells)), key=lambda i: cells[i].total)
+            if faintest == worst or cells[faintest].total >= misfits[worst]:
+                break
+        elif len(cells) >= lights:
+            break
+        parts = _cut(cells[worst], widest)
+        if not parts:
+            misfits[worst] = 0.0
             continue
-        for part, badness in zip(parts, misfits, strict=True):
-            heapq.heappush(open_cells, (-badness, number, part))
-            number += 1
-    done += [cell for _, _, cell in open_cells]
-    return sorted(done, key=lambda cell: -cell.total)
+        cells[worst : worst + 1] = parts
+        misfits[worst : worst + 1] = [_badness(part, all_light, widest) for part in parts]
+        while len(cells) > lights and not keep_all:
+            faintest = min(range(len(cells)), key=lambda i: cells[i].total)
+            left_out.append(cells.pop(faintest))
+            misfits.pop(faintest)
+    cells.sort(key=lambda cell: -cell.total)
+    left_out += cells[lights:]
+    return cells[:lights], sorted(left_out, key=lambda cell: -cell.total)
+
+
+def _badness(cell: Cell, all_light: float, widest: float) -> float:
+    """The misfit of a cell that may want a cut, else 0."""
+    misfit = cell.misfit()
+    wants_a_cut = misfit > ALLOWED_MISFIT * all_light or cell.angular_diameter > widest
+    return misfit if wants_a_cut else 0.0
+
+
+def _cut(cell: Cell, widest: float) -> tuple[Cell, ...]:
+    parts = split(cell)
+    if parts and cell.angular_diameter <= widest:
+        gain = hypot(*(part.misfit() for part in parts)) / cell.misfit()
+        return parts if gain <= GAIN_OF_A_CUT else ()
+    return parts

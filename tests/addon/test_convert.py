@@ -331,9 +331,9 @@ def test_bad_worlds_get_one_sentence_and_stay(scene, breaking, sentence):
 
 
 def test_an_error_leaves_an_earlier_conversion_as_it_was(scene, two_suns):
-    texture = hdri_world(scene, two_suns)
+    hdri_world(scene, two_suns)
     bpy.ops.sunsplit.convert()
-    texture.projection = "MIRROR_BALL"
+    node(scene.world.node_tree, "TEX_ENVIRONMENT").projection = "MIRROR_BALL"
     things = inventory()
     with pytest.raises(RuntimeError, match="mirror ball"):
         bpy.ops.sunsplit.convert()

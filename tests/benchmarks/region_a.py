@@ -116,12 +116,13 @@ def set_up(scene: bpy.types.Scene, row: Row) -> tuple[float, float, float]:
     if row.calm is None:
         return 0.0, 0.0, 0.0
     from sunsplit.addon.scene import convert_scene
-    from sunsplit.addon.world import contrast
+    from sunsplit.core.sampling import contrast
+    from sunsplit.core.settings import ConversionSettings
 
     default = strata.CALM
     strata.CALM = row.calm
     try:
-        conversion = convert_scene(scene).conversion
+        conversion = convert_scene(scene, ConversionSettings()).conversion
     finally:
         strata.CALM = default
     world = scene.world.cycles

@@ -1,0 +1,51 @@
+"""How a path tracer should sample a residual map: what Cycles calls world importance sampling."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .environment import luminance
+from .sphere import row_solid_angles
+
+CALM_ENOUGH = 2.5
+"""Second moment of a residual, mean(L^2) / mean(L)^2 over the sphere, up to which sampling by
+surfaces alone costs no more than a table; this and the next bounds by docs/benchmarks/region_a.md.
+"""
+
+CALM_PEAK = 1000.0
+"""Brightest pixel in means of the residual up to which a small table misses nothing that counts."""
+
+SMALL_TABLE = 512
+"""Width of the sampling table for a residual that is calm, but not calm enough to do without."""
+
+
+@dataclass(frozen=True)
+class WorldSampling:
+    """Cycles' method, and the width of its table where the method is MANUAL."""
+
+    method: Literal["NONE", "MANUAL", "AUTOMATIC"]
+    resolution: int = SMALL_TABLE
+
+
+def choose_sampling(residual: NDArray[np.float32] | None) -> WorldSampling:
+    """None or a small table where the residual is calm, Cycles' own large one where it is not."""
+    if residual is None:
+        return WorldSampling("NONE")
+    moment, peak = contrast(residual)
+    if peak > CALM_PEAK:
+        return WorldSampling("AUTOMATIC")
+    return WorldSampling("NONE" if moment <= CALM_ENOUGH else "MANUAL")
+
+
+def contrast(radiance: NDArray[np.float32]) -> tuple[float, float]:
+    """(mean(L^2) / mean(L)^2, max(L) / mean(L)) of a map's luminance over the sphere."""
+    lum = luminance(radiance)
+    solid = row_solid_angles(lum.shape[1], lum.shape[0]) / (4 * np.pi)
+    mean = float(lum.sum(axis=1) @ solid)
+    if mean == 0:
+        return 1.0, 1.0
+    return float((lum**2).sum(axis=1) @ solid) / mean**2, float(lum.max()) / mean
