@@ -1,0 +1,31 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sunsplit.core.sampling import choose_sampling, contrast
+from tests.maps import sky
+
+
+def test_contrast_of_a_constant_map():
+    assert contrast(sky(64, 0.7).astype(np.float32)) == pytest.approx((1, 1), rel=1e-6)
+
+
+def test_contrast_of_one_lit_pixel_is_the_sphere_over_the_pixel():
+    pixels = np.zeros((32, 64, 3), np.float32)
+    pixels[16, 5] = 3
+    solid = 2 * np.pi / 64 * 2 * np.sin(np.pi * 16.5 / 32) * np.sin(np.pi / 64)
+    assert contrast(pixels) == pytest.approx((4 * np.pi / solid,) * 2, rel=1e-9)
+
+
+@pytest.mark.parametrize(("part", "method"), [(0.5, "NONE"), (0.02, "MANUAL"), (1e-4, "AUTOMATIC")])
+def test_the_more_peaked_the_larger_the_table(part, method):
+    """A band of this part of the sphere shines; the rest is black."""
+    pixels = np.zeros((256, 512, 3), np.float32)
+    lit = np.random.default_rng(0).random((256, 512)) < part
+    pixels[lit] = 1
+    assert choose_sampling(pixels).method == method
+
+
+def test_without_a_residual_there_is_nothing_to_sample():
+    assert choose_sampling(None).method == "NONE"
