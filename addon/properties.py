@@ -35,7 +35,7 @@ CHOICES = {
     ),
     "share": FloatProperty(
         name="Share",
-        description="Part of all light that the bright region holds. 1: the whole map becomes lamps",
+        description="Part of all light in the bright region. 1: the whole map becomes lamps",
         default=0.5,
         options=_FRESH,
         min=0.001,
