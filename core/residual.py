@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
+from .cells import Cell
+from .environment import EnvironmentMap
 
 LARGE = 40_000
 """Pixels above which a group gets the mean of its rim instead of a smooth fill: a region that
@@ -56,3 +58,15 @@ def _harmonic(
     matrix = csc_array((values, places), shape=(count, count))
     given = np.where(outside[..., None], flat[near], 0).sum(axis=1, dtype=np.float64)
     return np.maximum(splu(matrix).solve(given), 0)
+
+
+def without(environment: EnvironmentMap, cells: list[Cell]) -> NDArray[np.float32]:
+    """The map less the light of these cells, float32 (height, width, 3)."""
+    solid = sphere.row_solid_angles(environment.width, environment.height)
+    residual = environment.radiance.copy()
+    flat = residual.reshape(-1, 3)
+    for cell in cells:
+        rows = cell.pixels // environment.width
+        flat[cell.pixels] = flat[cell.pixels] - cell.flux / solid[rows, None]
+    np.maximum(flat, 0, out=flat)
+    return residual

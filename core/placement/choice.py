@@ -1,0 +1,79 @@
+"""Which groups of region A become suns, and what the user should know of the others."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import sphere
+from ..cells import Cell
+from ..environment import EnvironmentMap
+from ..settings import ConversionSettings
+from ..strata import Strata
+from .groups import WIDEST_DISC, cut_misfits
+
+SMALLEST_SUN = 0.005
+"""Part of all light below which the automatic choice makes no sun: nobody would see its shadow."""
+
+WIDEST_OF_A_SHARE = np.radians(10)
+"""Angular diameter above which cells of a share that the user has set are cut while lights last:
+a large region wants all the lights that it may have."""
+
+
+def choose_cells(
+    groups: list[Cell],
+    environment: EnvironmentMap,
+    strata: Strata,
+    settings: ConversionSettings,
+) -> tuple[list[Cell], list[str]]:
+    """The cells that become suns, brightest first, and what the user should know of the rest."""
+    solid = sphere.row_solid_angles(environment.width, environment.height)
+    all_light = float(strata.luminance.sum(axis=1) @ solid)
+    groups = sorted(groups, key=lambda group: -group.total)
+    if settings.share is not None:
+        return _cells_of_a_share(groups, all_light, strata, settings)
+    seen = [group for group in groups if group.total >= SMALLEST_SUN * all_light]
+    notes = _left_out(groups[len(seen) :], f"each below {SMALLEST_SUN:.1%}", all_light)
+    if not groups:
+        notes.append("No pixel is much brighter than the rest: the map needs no sun.")
+    cells, without_light = cut_misfits(seen, settings.lights, all_light)
+    wide = [cell for cell in cells if cell.angular_diameter > WIDEST_DISC]
+    cells = [cell for cell in cells if cell.angular_diameter <= WIDEST_DISC]
+    notes += _left_out(wide, "too wide for a lamp", all_light)
+    notes += _left_out(without_light, _limit(settings), all_light)
+    return cells, notes
+
+
+def _cells_of_a_share(
+    groups: list[Cell], all_light: float, strata: Strata, settings: ConversionSettings
+) -> tuple[list[Cell], list[str]]:
+    """Cells where the user has set the share: wide ones stay, but are cut as far as lights go."""
+    notes = []
+    if abs(strata.share - settings.share) > 0.02:
+        notes.append(
+            f"A share of {settings.share:.0%} was asked for; pixels of equal brightness stay "
+            f"together, so region A holds {strata.share:.1%}."
+        )
+    cells, without_light = cut_misfits(
+        groups, settings.lights, all_light, widest=WIDEST_OF_A_SHARE, keep_all=settings.share == 1
+    )
+    notes += _left_out(without_light, _limit(settings), all_light)
+    wide = [cell for cell in cells if cell.angular_diameter > WIDEST_DISC]
+    if wide:
+        widest = np.degrees(max(cell.angular_diameter for cell in wide))
+        notes.append(
+            f"The widest sun spans {widest:.0f}° and stands for its light only roughly: "
+            "more lights or a smaller share would be truer."
+        )
+    return cells, notes
+
+
+def _limit(settings: ConversionSettings) -> str:
+    return f"beyond the limit of {settings.lights} lights"
+
+
+def _left_out(groups: list[Cell], why: str, all_light: float) -> list[str]:
+    if not groups:
+        return []
+    part = sum(group.total for group in groups) / all_light
+    peaks = "1 bright spot" if len(groups) == 1 else f"{len(groups)} bright spots"
+    return [f"{peaks} with {part:.2%} of all light stay in the residual: {why}."]
