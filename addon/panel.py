@@ -59,3 +59,4 @@ class SUNSPLIT_PT_settings(bpy.types.Panel):
         row.prop(settings, "share")
         layout.prop(settings, "strata")
         layout.prop(settings, "residual")
+        layout.prop(settings, "residual_width")

@@ -61,6 +61,13 @@ CHOICES = {
         default=DEFAULTS.residual,
         options=_FRESH,
     ),
+    "residual_width": IntProperty(
+        name="Rest Width",
+        description="Pixels of the residual map's width, a whole part of the map's; 0: as wide",
+        default=0,
+        options=_FRESH,
+        min=0,
+    ),
 }
 """The settings of a conversion, once: for the scene and as arguments of the operator."""
 

@@ -39,7 +39,12 @@ class SceneConversion:
 
 
 def settings_for(
-    lights: int, share_auto: bool, share: float, strata: int, residual: str
+    lights: int,
+    share_auto: bool,
+    share: float,
+    strata: int,
+    residual: str,
+    residual_width: int,
 ) -> ConversionSettings:
     """The values of the panel as the core wants them."""
     return ConversionSettings(
@@ -48,6 +53,7 @@ def settings_for(
         # The slider can stop at an odd number; the next even one is meant.
         strata=strata + strata % 2,
         residual="none" if share == 1 and not share_auto else residual,
+        residual_width=residual_width or None,
     )
 
 

@@ -135,6 +135,12 @@ def _parser() -> argparse.ArgumentParser:
         "--strata", type=_strata, default=2, metavar="N", help="strata of luminance (default: 2)"
     )
     convert.add_argument("--residual", choices=("map", "none"), default="map")
+    convert.add_argument(
+        "--residual-width",
+        type=_count,
+        metavar="PIXELS",
+        help="a whole part of the map's width (default: the map's own)",
+    )
     convert.add_argument("--preview", action="store_true", help="also write <name>.preview.png")
     convert.add_argument("--json", action="store_true", help="print the result as JSON")
     convert.set_defaults(run=run_convert)
@@ -188,6 +194,7 @@ def run_convert(options: argparse.Namespace) -> int:
         share=options.share,
         strata=options.strata,
         residual=options.residual if options.share != 1 else "none",
+        residual_width=options.residual_width,
     )
     with terminal_progress() as progress:
         progress("reading", 0.0)

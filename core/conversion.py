@@ -13,7 +13,7 @@ from .cells import Cell
 from .environment import EnvironmentMap
 from .placement.choice import choose_cells
 from .progress import Progress, silent
-from .residual import surroundings, without
+from .residual import reduced, surroundings, without
 from .settings import ConversionSettings
 from .strata import Strata, stratify
 from .suns import Sun, disc_sun
@@ -23,7 +23,8 @@ from .suns import Sun, disc_sun
 class Conversion:
     """What became of a map.
 
-    suns: brightest first. residual: float32 (height, width, 3), or None when not asked for.
+    suns: brightest first. residual: float32 (height, width, 3) of the width that was asked for,
+    or None.
     notes: plain sentences for the user.
     """
 
@@ -51,7 +52,9 @@ def convert(
     cells, notes = choose_cells(groups, environment, strata, settings)
     suns = tuple(disc_sun(cell, _stratum(cell, strata)) for cell in cells)
     progress("residual", 0.7)
-    residual = without(environment, cells) if settings.residual == "map" else None
+    residual = None
+    if settings.residual == "map":
+        residual = reduced(without(environment, cells), settings.residual_width)
     progress("account", 0.9)
     account = settle(environment.radiance, suns, residual)
     progress("done", 1.0)

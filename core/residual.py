@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from . import sphere
 from .cells import Cell
 from .environment import EnvironmentMap
+from .errors import UnusableInput
 
 LARGE = 40_000
 """Pixels above which a group gets the mean of its rim instead of a smooth fill: a region that
@@ -70,3 +71,25 @@ def without(environment: EnvironmentMap, cells: list[Cell]) -> NDArray[np.float3
         flat[cell.pixels] = flat[cell.pixels] - cell.flux / solid[rows, None]
     np.maximum(flat, 0, out=flat)
     return residual
+
+
+def reduced(residual: NDArray[np.float32], width: int | None) -> NDArray[np.float32]:
+    """A residual map of another width, each pixel the mean of those it replaces.
+
+    Means are weighted by solid angle, so that every pixel keeps the light of its part of the
+    sphere and the account closes. width: None for the map's own. Raises UnusableInput where the
+    width is no whole part of the map's.
+    """
+    height, own = residual.shape[:2]
+    if width is None or width == own:
+        return residual
+    if width > own or own % width or width % 2:
+        raise UnusableInput(
+            f"A residual {width} pixels wide cannot be made of a map {own} wide: "
+            "the width must be even and a whole part of the map's."
+        )
+    step = own // width
+    weight = sphere.row_solid_angles(own, height).reshape(width // 2, step, 1, 1, 1)
+    blocks = residual.reshape(width // 2, step, width, step, 3)
+    light = (blocks * weight).sum(axis=(1, 3), dtype=np.float64)
+    return (light / (step * weight.sum(axis=1)[:, 0])).astype(np.float32)

@@ -23,12 +23,14 @@ class ConversionSettings:
         1 turns the whole map into suns and leaves no residual.
     strata: how many strata of luminance, an even number; half of them make up region A.
     residual: "map", or "none" to leave the rest of the light out.
+    residual_width: pixels, a whole part of the map's width, or None for the map's own.
     """
 
     lights: int = 16
     share: float | None = None
     strata: int = 2
     residual: ResidualKind = "map"
+    residual_width: int | None = None
 
     def __post_init__(self) -> None:
         if self.lights < 1:
@@ -39,6 +41,9 @@ class ConversionSettings:
             raise BadSetting(f"strata must be an even number from 2 up, not {self.strata}.")
         if self.residual not in ("map", "none"):
             raise BadSetting(f'residual must be "map" or "none", not "{self.residual}".')
+
+        if self.residual_width is not None and self.residual_width < 2:
+            raise BadSetting(f"residual_width must be at least 2, not {self.residual_width}.")
 
     def as_dict(self) -> dict[str, object]:
         return asdict(self)

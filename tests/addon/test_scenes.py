@@ -292,3 +292,10 @@ def test_the_output_of_the_engine_in_use_counts(scene, east, north):
         bpy.ops.sunsplit.convert()
         assert azimuth_of(suns(scene)[0]) == pytest.approx(azimuth, abs=0.1)
         bpy.ops.sunsplit.restore()
+
+
+def test_a_narrower_residual(scene, east):
+    hdri_world(scene, east)
+    bpy.ops.sunsplit.convert(residual_width=32)
+    image = scene.world.node_tree.nodes["Sunsplit: Residual"].image
+    assert tuple(image.size) == (32, 16)

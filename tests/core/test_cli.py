@@ -56,6 +56,15 @@ def test_convert_writes_and_says_what(sky_file, out, capfd):
     assert complaints == ""
 
 
+def test_a_narrower_residual_is_written_and_adds_up(sky_file, out, capfd):
+    assert run("convert", sky_file, "-o", out, "--residual-width", "32", "--json") == 0
+    written = json.loads(capfd.readouterr().out)
+    assert (written["residual"]["width"], written["residual"]["height"]) == (32, 16)
+    assert account_of_files(out / "map.lights.json").relative_error.max() <= ACCOUNT_HALF
+    assert run("convert", sky_file, "-o", out, "--residual-width", "50") == 1
+    assert "whole part" in capfd.readouterr().err
+
+
 def test_convert_writes_here_unless_told_otherwise(sky_file, tmp_path, out, monkeypatch):
     out.mkdir()
     monkeypatch.chdir(out)

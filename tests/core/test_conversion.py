@@ -8,6 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sunsplit.core import ConversionSettings, convert, load, sphere
+from sunsplit.core.errors import SunsplitError
+from sunsplit.core.residual import reduced
 from sunsplit.core.settings import BadSetting
 from sunsplit.core.tolerances import ACCOUNT, EQUIVARIANCE
 from tests.maps import direction, disc_energy, environment, paint_disc, painted_radius, sky
@@ -258,3 +260,24 @@ def test_a_small_share_takes_the_brightest_level_at_least(sunrise):
 def test_a_lamp_that_has_to_be_wide_is_named():
     conversion = convert(load_random(), ConversionSettings(lights=1, share=1.0, residual="none"))
     assert "widest sun spans 180" in " ".join(conversion.notes)
+
+
+@pytest.mark.parametrize("width", [512, 64, 2])
+def test_a_narrower_residual_keeps_the_account(sunrise, width):
+    conversion = convert(load(sunrise), ConversionSettings(residual_width=width))
+    assert conversion.residual.shape == (width // 2, width, 3)
+    assert conversion.account.relative_error.max() <= ACCOUNT
+
+
+def test_a_narrower_residual_keeps_light_where_it_is():
+    pixels = sky(64, 0.0)
+    pixels[10:12, 20:22] = np.array([[1, 2], [3, 4]])[..., None]
+    found = reduced(pixels.astype(np.float32), 32)
+    lit = np.argwhere(found.any(axis=-1))
+    assert lit.tolist() == [[5, 10]]
+
+
+@pytest.mark.parametrize("width", [2048, 300, 1])
+def test_a_residual_of_an_impossible_width_is_refused(sunrise, width):
+    with pytest.raises(SunsplitError, match="residual"):
+        convert(load(sunrise), ConversionSettings(residual_width=width))
