@@ -143,7 +143,7 @@ def converted_world(
         image = residual_image(residual) if residual is not None else None
         _insert_residual(tree, tree.nodes[light.texture.node.name], image)
         _set_sampling(new, residual)
-    except BaseException:
+    except BaseException:  # whatever it is, it goes on; only the half-made copy goes away
         remove_converted(new)
         raise
     # EEVEE would take a second sun out of the residual.
