@@ -92,6 +92,7 @@ def test_json_is_one_object_and_nothing_else(sky_file, out, capfd):
         "share": 0,
         "strata": 2,
         "residual": "map",
+        "residual_width": None,
         "threshold": 0,
     }
 
