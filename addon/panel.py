@@ -52,11 +52,24 @@ class SUNSPLIT_PT_settings(bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
+        layout.prop(settings, "method")
         layout.prop(settings, "lights")
+        layout.prop(settings, "shape")
         layout.prop(settings, "share_auto")
         row = layout.row()
         row.active = not settings.share_auto
         row.prop(settings, "share")
         layout.prop(settings, "strata")
+        if settings.method != "edge":
+            column = layout.column()
+            column.prop(settings, "samples")
+            column.prop(settings, "frequency")
+            column.prop(settings, "position")
+            column.prop(settings, "per_stratum")
+        layout.separator()
         layout.prop(settings, "residual")
-        layout.prop(settings, "residual_width")
+        if settings.residual == "voronoi":
+            layout.prop(settings, "residual_samples")
+        if settings.residual != "none":
+            layout.prop(settings, "residual_width")
+            layout.prop(settings, "fill")

@@ -35,10 +35,11 @@ CHOICES = {
     ),
     "share": FloatProperty(
         name="Share",
-        description="Part of all light in the bright region. 1: the whole map becomes lamps",
+        description="Part of all light in the bright region. 0: no lamps; 1: the whole map "
+        "becomes lamps",
         default=0.5,
         options=_FRESH,
-        min=0.001,
+        min=0.0,
         max=1.0,
         subtype="FACTOR",
     ),
@@ -51,11 +52,89 @@ CHOICES = {
         step=2,
         soft_max=16,
     ),
+    "method": EnumProperty(
+        name="Method",
+        description="How lamps are placed in the bright region",
+        items=[
+            (
+                "edge",
+                "Whole Lights",
+                "A lamp for each light, cut where its shadow would be wrong",
+            ),
+            (
+                "penrose",
+                "Penrose",
+                "Samples of a Penrose tiling by importance, a lamp for each",
+            ),
+            ("median-cut", "Median Cut", "Boxes that hold equal light, a lamp for each"),
+            ("variance", "Variance", "Boxes whose light is least spread, a lamp for each"),
+            ("kmeans", "K-Means", "Cells around the means of their light, a lamp for each"),
+        ],
+        default=DEFAULTS.method,
+        options=_FRESH,
+    ),
+    "samples": IntProperty(
+        name="Samples",
+        description="So many samples are clustered down to the lights; 0: as few as it takes",
+        default=0,
+        options=_FRESH,
+        min=0,
+        soft_max=4096,
+    ),
+    "frequency": EnumProperty(
+        name="Clusters Weigh",
+        description="What weighs samples that lie so close that they are clustered",
+        items=[
+            ("energy", "Light", "The light of each sample's cell"),
+            ("mean", "Mean Light", "The light of each sample's cell over the cell's area"),
+            ("one", "Number", "Each sample counts the same"),
+        ],
+        default=DEFAULTS.frequency,
+        options=_FRESH,
+    ),
+    "per_stratum": BoolProperty(
+        name="Per Stratum",
+        description="Lamps are placed in each bright stratum by itself",
+        default=DEFAULTS.per_stratum,
+        options=_FRESH,
+    ),
+    "shape": EnumProperty(
+        name="Shape",
+        description="What the lamps look like in a mirror, and how soft their shadows are",
+        items=[
+            ("disc", "Discs", "As wide as the light that they replace"),
+            ("point", "Points", "Of no width: hard shadows, not seen in mirrors"),
+        ],
+        default=DEFAULTS.shape,
+        options=_FRESH,
+    ),
+    "position": EnumProperty(
+        name="Position",
+        description="Where a lamp stands in its cell",
+        items=[
+            ("centroid", "Mean of Light", "Where the cell's light has its mean"),
+            ("sample", "Sample", "Where the sample was placed"),
+        ],
+        default=DEFAULTS.position,
+        options=_FRESH,
+    ),
+    "fill": EnumProperty(
+        name="Under Lamps",
+        description="What the world shows where the lamps' light was taken out",
+        items=[
+            ("auto", "Automatic", "The surroundings with whole lights, else black"),
+            ("surroundings", "Surroundings", "Lamps get what shines above the surroundings"),
+            ("black", "Black", "Lamps get all the light of the bright region"),
+        ],
+        default="auto",
+        options=_FRESH,
+    ),
     "residual": EnumProperty(
         name="Rest",
         description="What becomes of the light that no lamp gives",
         items=[
             ("map", "World Map", "The world shows the map without the lamps' light"),
+            ("voronoi", "Voronoi Map", "The world shows cells of samples of that map"),
             ("none", "Nothing", "Lamps only: the rest of the light is left out"),
         ],
         default=DEFAULTS.residual,
@@ -67,6 +146,14 @@ CHOICES = {
         default=0,
         options=_FRESH,
         min=0,
+    ),
+    "residual_samples": IntProperty(
+        name="Rest Samples",
+        description="Cells of the Voronoi map",
+        default=DEFAULTS.residual_samples,
+        options=_FRESH,
+        min=1,
+        soft_max=4096,
     ),
 }
 """The settings of a conversion, once: for the scene and as arguments of the operator."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 
@@ -38,22 +40,21 @@ class SceneConversion:
         return f"{count} {noun} with {self.conversion.account.share:.1%} of all light"
 
 
-def settings_for(
-    lights: int,
-    share_auto: bool,
-    share: float,
-    strata: int,
-    residual: str,
-    residual_width: int,
-) -> ConversionSettings:
-    """The values of the panel as the core wants them."""
+def settings_for(chosen: Mapping[str, Any]) -> ConversionSettings:
+    """The values of the panel, by the names of `properties.CHOICES`, as the core wants them."""
+    values = dict(chosen)
+    share = None if values.pop("share_auto") else float(values["share"])
     return ConversionSettings(
-        lights=lights,
-        share=None if share_auto else float(share),
-        # The slider can stop at an odd number; the next even one is meant.
-        strata=strata + strata % 2,
-        residual="none" if share == 1 and not share_auto else residual,
-        residual_width=residual_width or None,
+        **values
+        | {
+            "share": share,
+            # The slider can stop at an odd number; the next even one is meant.
+            "strata": values["strata"] + values["strata"] % 2,
+            "residual": "none" if share == 1 else values["residual"],
+            "samples": values["samples"] or None,
+            "residual_width": values["residual_width"] or None,
+            "fill": None if values["fill"] == "auto" else values["fill"],
+        }
     )
 
 
@@ -78,7 +79,7 @@ def convert_scene(scene: bpy.types.Scene, settings: ConversionSettings) -> Scene
     conversion = convert(read_image(light.image), settings)
     original = state.original_world if again else world
     sentences = [*_sentences(conversion), *_warnings(scene, world, original, light)]
-    new = converted_world(world, light, conversion.residual)
+    new = converted_world(world, light, conversion)
     lamps = make_lamps(conversion.suns, light, world)
     # From here on `light` must not be used: its nodes go with the world that is replaced.
     restore_scene(scene)

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.conversion import Conversion
 from ..core.environment import EnvironmentMap, environment_from_pixels
 from ..core.errors import CannotWrite, UnusableInput
 from ..core.sampling import choose_sampling
@@ -123,9 +124,9 @@ def _working_space() -> str:
 
 
 def converted_world(
-    world: bpy.types.World, light: WorldLight, residual: NDArray[np.float32] | None
+    world: bpy.types.World, light: WorldLight, conversion: Conversion
 ) -> bpy.types.World:
-    """A copy of a world in which all rays but the camera's see the residual (None: black).
+    """A copy of a world in which all rays but the camera's see the residual (or black).
 
     world: what `light` was found in; when it is a converted one, the copy loses what that
     conversion has put in. Nothing is left behind when this fails.
@@ -140,8 +141,11 @@ def converted_world(
             group.node_tree[TAG] = True
             tree = group.node_tree
         _strip(tree)
+        texture, residual = tree.nodes[light.texture.node.name], conversion.residual
         image = residual_image(residual) if residual is not None else None
-        _insert_residual(tree, tree.nodes[light.texture.node.name], image)
+        # Between cells nothing is to be blended: a Voronoi map has edges.
+        closest = conversion.settings.residual == "voronoi"
+        _insert_residual(tree, texture, image, "Closest" if closest else texture.interpolation)
         _set_sampling(new, residual)
     except BaseException:  # whatever it is, it goes on; only the half-made copy goes away
         remove_converted(new)
@@ -162,7 +166,10 @@ def _strip(tree: bpy.types.NodeTree) -> None:
 
 
 def _insert_residual(
-    tree: bpy.types.NodeTree, texture: bpy.types.Node, image: bpy.types.Image | None
+    tree: bpy.types.NodeTree,
+    texture: bpy.types.Node,
+    image: bpy.types.Image | None,
+    interpolation: str,
 ) -> None:
     """Put a mix behind an environment texture: the camera sees it, all else the residual."""
     outgoing = [link.to_socket for link in texture.outputs["Color"].links]
@@ -180,6 +187,7 @@ def _insert_residual(
     mix.inputs[6].default_value = (0, 0, 0, 1)
     if image is not None:
         rest = _texture_like(tree, texture, image)
+        rest.interpolation = interpolation
         tree.links.new(rest.outputs["Color"], mix.inputs[6])
     for socket in outgoing:
         tree.links.new(mix.outputs[2], socket)
@@ -194,7 +202,6 @@ def _texture_like(
     rest[TAG] = True
     rest.location = texture.location.x, texture.location.y - 300
     rest.image = image
-    rest.interpolation = texture.interpolation
     rest.projection = texture.projection
     old, new = texture.texture_mapping, rest.texture_mapping
     for name in ("vector_type", "translation", "rotation", "scale"):

@@ -68,11 +68,8 @@ class Cell:
 
     @property
     def angular_diameter(self) -> float:
-        """Diameter in radians, at most pi, of the uniform disc with the cell's moments.
-
-        Such a disc has R = (1 + cos a) / 2, so a = 2 asin sqrt(1 - R); a hemisphere at most.
-        """
-        return min(4 * float(np.arcsin(np.sqrt(min(self.shortfall, 0.5)))), np.pi)
+        """Diameter in radians of the uniform disc with the cell's moments."""
+        return disc_diameter(self.shortfall)
 
     def misfit(self) -> float:
         """Predicted shadow-edge error of a disc in the place of this cell, times its light.
@@ -91,6 +88,14 @@ class Cell:
             for turn in turns
         ]
         return self.total * float(np.sqrt(np.mean(squares) / 2))
+
+
+def disc_diameter(shortfall: float) -> float:
+    """Diameter in radians, at most pi, of a uniform disc by its 1 - R.
+
+    Such a disc has R = (1 + cos a) / 2, so a = 2 asin sqrt(1 - R); a hemisphere at most.
+    """
+    return min(4 * float(np.arcsin(np.sqrt(min(shortfall, 0.5)))), np.pi)
 
 
 def _edge_difference(position: Floats, flux: Floats, radius: float) -> float:

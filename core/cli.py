@@ -1,4 +1,4 @@
-"""The command line: `sunsplit convert` and `sunsplit info`. Needs no Blender.
+"""The command line: `sunsplit convert`, `info` and `figures`. Needs no Blender.
 
 Exit status: 0 done, 1 the input cannot be used or the output not written, 2 wrong usage,
 130 cancelled.
@@ -16,6 +16,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from . import interrupts
+from .cli_settings import (
+    add_figure_settings,
+    add_settings,
+    figure_settings_from,
+    settings_from,
+)
 from .errors import SunsplitError
 from .progress import Progress, terminal_progress
 
@@ -117,30 +123,8 @@ def _parser() -> argparse.ArgumentParser:
         description="Write <name>.lights.json and <name>.residual.exr (and a preview).",
     )
     _add_map(convert)
-    convert.add_argument(
-        "-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: here"
-    )
-    convert.add_argument(
-        "--lights", type=_count, default=16, metavar="N", help="at most N suns (default: 16)"
-    )
-    convert.add_argument(
-        "--share",
-        type=_share,
-        default=None,
-        metavar="X",
-        help="part of all light in the bright region, above 0 up to 1 (1: no residual), "
-        "or auto (default): whole peaks with their halo",
-    )
-    convert.add_argument(
-        "--strata", type=_strata, default=2, metavar="N", help="strata of luminance (default: 2)"
-    )
-    convert.add_argument("--residual", choices=("map", "none"), default="map")
-    convert.add_argument(
-        "--residual-width",
-        type=_count,
-        metavar="PIXELS",
-        help="a whole part of the map's width (default: the map's own)",
-    )
+    _add_output(convert)
+    add_settings(convert)
     convert.add_argument("--preview", action="store_true", help="also write <name>.preview.png")
     convert.add_argument("--json", action="store_true", help="print the result as JSON")
     convert.set_defaults(run=run_convert)
@@ -148,6 +132,16 @@ def _parser() -> argparse.ArgumentParser:
     _add_map(info)
     info.add_argument("--json", action="store_true", help="print the result as JSON")
     info.set_defaults(run=run_info)
+    figures = verbs.add_parser(
+        "figures",
+        help="draw samples, cells and regions of an HDRI, as in the paper",
+        description="Write <name>.figure1.png, .figure2.png and .figure3.png.",
+    )
+    _add_map(figures)
+    _add_output(figures)
+    add_figure_settings(figures)
+    figures.add_argument("--json", action="store_true", help="print the result as JSON")
+    figures.set_defaults(run=run_figures)
     return parser
 
 
@@ -158,28 +152,10 @@ def _add_map(verb: argparse.ArgumentParser) -> None:
     )
 
 
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number from 1 up")
-    return int(text)
-
-
-def _strata(text: str) -> int:
-    if not text.isdecimal() or int(text) < 2 or int(text) % 2:
-        raise argparse.ArgumentTypeError(f"{text!r} is not an even number from 2 up")
-    return int(text)
-
-
-def _share(text: str) -> float | None:
-    if text == "auto":
-        return None
-    try:
-        share = float(text)
-    except ValueError:
-        share = 0.0
-    if not 0 < share <= 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor above 0 up to 1")
-    return share
+def _add_output(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument(
+        "-o", "--output", type=Path, default=Path(), metavar="DIR", help="default: here"
+    )
 
 
 def run_convert(options: argparse.Namespace) -> int:
@@ -187,15 +163,8 @@ def run_convert(options: argparse.Namespace) -> int:
     from .files.conversion import save
     from .files.maps import load
     from .report import conversion_lines
-    from .settings import ConversionSettings
 
-    settings = ConversionSettings(
-        lights=options.lights,
-        share=options.share,
-        strata=options.strata,
-        residual=options.residual if options.share != 1 else "none",
-        residual_width=options.residual_width,
-    )
+    settings = settings_from(options)
     with terminal_progress() as progress:
         progress("reading", 0.0)
         environment = load(options.map, options.allow_ldr)
@@ -229,6 +198,27 @@ def run_info(options: argparse.Namespace) -> int:
     return 0
 
 
+def run_figures(options: argparse.Namespace) -> int:
+    from .files.figures import draw_figures, save_figures
+    from .files.maps import load
+
+    settings = figure_settings_from(options)
+    with terminal_progress() as progress:
+        progress("reading", 0.0)
+        environment = load(options.map, options.allow_ldr)
+        pictures = draw_figures(environment, settings, _within(progress, 0.1, 0.9))
+        progress("writing", 0.9)
+        paths = save_figures(pictures, environment.name, options.output)
+    try:
+        if options.json:
+            print(json.dumps({"files": [str(path) for path in paths]}))
+        else:
+            print("\n".join(f"wrote {path}" for path in paths))
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("the files are written") from None
+    return 0
+
+
 def _within(progress: Progress, start: float, end: float) -> Progress:
     """A listener for a part of the whole work."""
     return lambda stage, fraction: progress(stage, start + (end - start) * fraction)
@@ -242,6 +232,7 @@ def _print_json(conversion: Conversion, files: WrittenFiles) -> None:
         for kind, path in (
             ("lights", files.lights),
             ("residual", files.residual),
+            ("samples", files.samples),
             ("preview", files.preview),
         )
     }

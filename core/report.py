@@ -8,6 +8,9 @@ from .conversion import Conversion
 from .environment import LUMINANCE_WEIGHTS, EnvironmentMap
 from .files.conversion import WrittenFiles, account_of_files
 
+LISTED = 32
+"""Suns that are listed one by one; the files hold them all."""
+
 
 def info_lines(conversion: Conversion) -> list[str]:
     """What a map holds, and what suns it would give."""
@@ -22,7 +25,7 @@ def info_lines(conversion: Conversion) -> list[str]:
 
 def conversion_lines(conversion: Conversion, files: WrittenFiles) -> list[str]:
     """What was read, made and written; the account as computed and added up from the files."""
-    paths = (files.lights, files.residual, files.preview)
+    paths = (files.lights, files.residual, files.samples, files.preview)
     return [
         *_map_lines(conversion.environment),
         *_sun_lines(conversion),
@@ -43,7 +46,7 @@ def _sun_lines(conversion: Conversion) -> list[str]:
     all_light = conversion.account.source @ LUMINANCE_WEIGHTS
     noun = "sun" if len(conversion.suns) == 1 else "suns"
     lines = [f"{len(conversion.suns)} {noun} with {conversion.account.share:.1%} of all light"]
-    for rank, sun in enumerate(conversion.suns, start=1):
+    for rank, sun in enumerate(conversion.suns[:LISTED], start=1):
         part = sun.scalar_irradiance @ LUMINANCE_WEIGHTS / all_light
         x, y, z = sun.to_light
         elevation = np.degrees(np.arctan2(z, np.hypot(x, y)))
@@ -52,6 +55,8 @@ def _sun_lines(conversion: Conversion) -> list[str]:
             f"  {rank:3d}  {part:7.2%}  azimuth {azimuth:6.2f}°  elevation {elevation:+6.2f}°"
             f"  {np.degrees(sun.angular_diameter):6.2f}° wide"
         )
+    if len(conversion.suns) > LISTED:
+        lines.append(f"       and {len(conversion.suns) - LISTED} more")
     return [*lines, *conversion.notes]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,67 +11,24 @@ from . import sphere
 from .cells import Cell
 from .environment import EnvironmentMap
 from .errors import UnusableInput
+from .region import RegionLight
 
-LARGE = 40_000
-"""Pixels above which a group gets the mean of its rim instead of a smooth fill: a region that
-large has no one surroundings, and solving for it would take seconds."""
-
-
-def surroundings(radiance: NDArray[np.float32], region: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """What the map would show inside a region without the region's own light.
-
-    The values around the region are carried into it by Laplace's equation, the smoothest surface
-    over a given rim; it has no bump or hole of its own and no favourite direction.
-    region: mask (height, width). Returns radiance (n, 3) of the region's pixels in reading order,
-    never above the map's own; 0 where the whole map is region.
-    """
-    height, width = region.shape
-    flat = radiance.reshape(-1, 3)
-    labels, count = sphere.connected_groups(region)
-    pixels = np.flatnonzero(region)
-    result = np.zeros((len(pixels), 3), np.float32)
-    for group in sphere.group_pixels(labels, count):
-        near = sphere.neighbours(group, width, height)
-        outside = ~region.ravel()[near]
-        if not outside.any():
-            continue
-        rim = flat[near[outside]].mean(axis=0, dtype=np.float64)
-        smooth = rim if len(group) > LARGE else _harmonic(flat, group, near, outside)
-        inside = np.searchsorted(pixels, group)
-        result[inside] = np.minimum(smooth.astype(np.float32), flat[group])
-    return result
+ROUNDED = 8 * np.finfo(np.float64).eps
+"""Part of a pixel that a product with its solid angle and a division by it may change."""
 
 
-def _harmonic(
-    flat: NDArray[np.float32],
-    group: NDArray[np.intp],
-    near: NDArray[np.intp],
-    outside: NDArray[np.bool_],
-) -> NDArray[np.float64]:
-    """Each pixel of the group the mean of its four neighbours; those outside are given."""
-    from scipy.sparse import csc_array
-    from scipy.sparse.linalg import splu
-
-    count = len(group)
-    own = np.arange(count)
-    row, side = np.nonzero(~outside)
-    column = np.searchsorted(group, near[row, side])
-    values = np.concatenate([np.full(count, 4.0), np.full(len(row), -1.0)])
-    places = np.concatenate([own, row]), np.concatenate([own, column])
-    matrix = csc_array((values, places), shape=(count, count))
-    given = np.where(outside[..., None], flat[near], 0).sum(axis=1, dtype=np.float64)
-    return np.maximum(splu(matrix).solve(given), 0)
-
-
-def without(environment: EnvironmentMap, cells: list[Cell]) -> NDArray[np.float32]:
-    """The map less the light of these cells, float32 (height, width, 3)."""
+def without(
+    environment: EnvironmentMap, replaced: Sequence[Cell | RegionLight]
+) -> NDArray[np.float32]:
+    """The map less this light, float32 (height, width, 3)."""
     solid = sphere.row_solid_angles(environment.width, environment.height)
     residual = environment.radiance.copy()
     flat = residual.reshape(-1, 3)
-    for cell in cells:
-        rows = cell.pixels // environment.width
-        flat[cell.pixels] = flat[cell.pixels] - cell.flux / solid[rows, None]
-    np.maximum(flat, 0, out=flat)
+    for light in replaced:
+        before = flat[light.pixels].astype(np.float64)
+        rest = before - light.flux / solid[light.pixels // environment.width, None]
+        # What the division has rounded is no light: black must be black.
+        flat[light.pixels] = np.where(rest > ROUNDED * before, rest, 0)
     return residual
 
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from .errors import SunsplitError
 
-ResidualKind = Literal["map", "none"]
+Method = Literal["edge", "penrose", "median-cut", "variance", "kmeans"]
+Shape = Literal["disc", "point"]
+Position = Literal["centroid", "sample"]
+Frequency = Literal["one", "energy", "mean"]
+ResidualKind = Literal["map", "voronoi", "none"]
+Fill = Literal["surroundings", "black"]
 
 
 class BadSetting(SunsplitError):
@@ -19,31 +24,71 @@ class ConversionSettings:
     """How to split a map.
 
     lights: at most so many suns.
-    share: the part of all light in region A, above 0 up to 1, or None: chosen for the map.
-        1 turns the whole map into suns and leaves no residual.
+    share: the part of all light in region A, 0 to 1, or None: chosen for the map.
+        0 leaves the whole map in region B; 1 turns all of it into suns and leaves no residual.
     strata: how many strata of luminance, an even number; half of them make up region A.
-    residual: "map", or "none" to leave the rest of the light out.
+    method: how lights are placed in region A. "edge": whole lights, cut where one disc would cast
+        wrong shadows. "penrose" (the paper's), "median-cut", "variance", "kmeans": samples of
+        region A by importance, and a light for the cell of each.
+    samples: so many are placed and clustered down to `lights`; None: as few as leave `lights` once
+        those nearer than a pixel are clustered.
+    per_stratum: each bright stratum is sampled on its own, and no cell reaches into another.
+    shape: "disc", as wide as the light that it replaces, or "point", of no width.
+    position: of a light, in the "centroid" of its cell's light or at the "sample" (paper, 2.2).
+    frequency: what weighs samples that are clustered (paper, section 3): "one", the "energy" of
+        their cells or its "mean" over the cell.
+    residual: "map", a "voronoi" map of samples (paper, 2.3), or "none": leave the rest out.
     residual_width: pixels, a whole part of the map's width, or None for the map's own.
+    residual_samples: how many samples a Voronoi map is made of.
+    fill: what the residual shows in region A: its "surroundings", with only what exceeds them
+        given to suns, or "black" (the paper's), with all light given to them. None: surroundings
+        with the method "edge", black with the others.
     """
 
     lights: int = 16
     share: float | None = None
     strata: int = 2
+    method: Method = "edge"
+    samples: int | None = None
+    per_stratum: bool = False
+    shape: Shape = "disc"
+    position: Position = "centroid"
+    frequency: Frequency = "energy"
     residual: ResidualKind = "map"
     residual_width: int | None = None
+    residual_samples: int = 500
+    fill: Fill | None = None
 
     def __post_init__(self) -> None:
-        if self.lights < 1:
-            raise BadSetting(f"lights must be at least 1, not {self.lights}.")
-        if self.share is not None and not 0 < self.share <= 1:
-            raise BadSetting(f"share must be above 0 and at most 1, not {self.share:g}.")
+        for name, least in (("lights", 1), ("samples", 1), ("residual_samples", 1)):
+            value = getattr(self, name)
+            if value is not None and value < least:
+                raise BadSetting(f"{name} must be at least {least}, not {value}.")
+        if self.share is not None and not 0 <= self.share <= 1:
+            raise BadSetting(f"share must be 0 to 1, not {self.share:g}.")
         if self.strata < 2 or self.strata % 2:
             raise BadSetting(f"strata must be an even number from 2 up, not {self.strata}.")
-        if self.residual not in ("map", "none"):
-            raise BadSetting(f'residual must be "map" or "none", not "{self.residual}".')
-
         if self.residual_width is not None and self.residual_width < 2:
             raise BadSetting(f"residual_width must be at least 2, not {self.residual_width}.")
+        for name, choice in _CHOICES.items():
+            if (value := getattr(self, name)) not in choice:
+                options = " or ".join(f'"{option}"' for option in choice if option)
+                raise BadSetting(f'{name} must be {options}, not "{value}".')
+
+    @property
+    def filled(self) -> Fill:
+        """What the residual shows in region A, with None resolved."""
+        return self.fill or ("surroundings" if self.method == "edge" else "black")
 
     def as_dict(self) -> dict[str, object]:
         return asdict(self)
+
+
+_CHOICES = {
+    "method": get_args(Method),
+    "shape": get_args(Shape),
+    "position": get_args(Position),
+    "frequency": get_args(Frequency),
+    "residual": get_args(ResidualKind),
+    "fill": (*get_args(Fill), None),
+}

@@ -41,6 +41,19 @@ def to_image(directions: ArrayLike) -> tuple[Floats, Floats]:
     return u, v
 
 
+def pixel_centres(indices: NDArray[np.intp], width: int, height: int) -> Floats:
+    """Unit vectors to the centres of the pixels with these flat indices, shape (n, 3)."""
+    rows, columns = np.divmod(indices, width)
+    return to_directions((columns + 0.5) / width, (rows + 0.5) / height)
+
+
+def centroid_angles(width: int, height: int) -> tuple[Floats, Floats]:
+    """Azimuth of each column, (width,), and polar angle of each row's centroid, (height,)."""
+    rows = np.arange(height)
+    azimuth = np.pi - 2 * np.pi * (np.arange(width) + 0.5) / width
+    return azimuth, np.pi * (rows + 0.5) / height + _centroid_shift(rows, height)
+
+
 def pixel_directions(indices: NDArray[np.intp], width: int, height: int) -> Floats:
     """Unit vectors to the centroids of the pixels with these flat indices, shape (n, 3).
 

@@ -41,6 +41,12 @@ class Strata:
         return len(self.bounds) + 1
 
     @property
+    def light(self) -> float:
+        """Luminance of the whole map's scalar irradiance."""
+        height, width = self.luminance.shape
+        return float(self.luminance.sum(axis=1) @ sphere.row_solid_angles(width, height))
+
+    @property
     def threshold(self) -> float:
         """Luminance above which a pixel belongs to region A."""
         return float(self.bounds[len(self.bounds) // 2])
@@ -58,7 +64,8 @@ class Strata:
 def stratify(environment: EnvironmentMap, share: float | None, count: int) -> Strata:
     """Cut a map into `count` strata so that region A holds `share` of its light.
 
-    share: 0 to 1, or None for the smallest share that takes whole peaks with their halo.
+    share: 0 (no region A) to 1, or None for the smallest share that takes whole peaks with their
+        halo.
     Pixels of equal luminance stay together, so the share that comes out is the nearest possible.
     """
     lum = luminance(environment.radiance)
@@ -121,6 +128,8 @@ class _Levels:
         """The level above which `share` of all light lies: one level at least, but never all of
         a map that has only one."""
         nearest = self.bound(1 - share)
+        if share == 0:
+            return float(self.value[-1])
         if nearest == self.value[-1] and len(self.value) > 1:
             return float(self.value[-2])
         return nearest

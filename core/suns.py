@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import Cell
+from .cells import disc_diameter
 
 
 @dataclass(frozen=True, eq=False)
 class Sun:
-    """A uniform disc at infinity.
+    """A uniform disc at infinity, or a point.
 
     to_light: unit vector from the scene to the disc's centre, (3,).
     irradiance: on a surface that faces the centre, linear Rec.709, (3,); a lamp's strength.
     scalar_irradiance: radiance integrated over the disc, (3,); what the account adds up.
-    angular_diameter: radians, up to pi. stratum: of the brightest pixel, 1 the darkest.
+    angular_diameter: radians, 0 (a point) up to pi. stratum: of the brightest pixel, 1 the darkest.
     """
 
     to_light: NDArray[np.float64]
@@ -28,21 +28,22 @@ class Sun:
 
     @property
     def radiance(self) -> NDArray[np.float64]:
-        """Radiance of the disc, (3,)."""
+        """Radiance of the disc, (3,); a point has none."""
         return self.scalar_irradiance / (4 * np.pi * np.sin(self.angular_diameter / 4) ** 2)
 
 
-def disc_sun(cell: Cell, stratum: int) -> Sun:
-    """The disc whose total, mean direction and second moment are the cell's.
+def disc_sun(
+    flux: NDArray[np.float64], to_light: NDArray[np.float64], shortfall: float, stratum: int
+) -> Sun:
+    """The disc whose total, mean direction and second moment are those of a cell.
 
-    A cap of half-angle a gives a facing surface (1 + cos a) / 2 of its scalar irradiance.
+    flux: scalar irradiance, (3,). shortfall: see `Cell.shortfall`. A cap of half-angle a gives a
+    facing surface (1 + cos a) / 2 of its scalar irradiance.
     """
-    diameter = cell.angular_diameter
-    scalar = cell.flux.sum(axis=0)
-    return Sun(
-        to_light=cell.to_light,
-        irradiance=scalar * (1 + np.cos(diameter / 2)) / 2,
-        scalar_irradiance=scalar,
-        angular_diameter=diameter,
-        stratum=stratum,
-    )
+    diameter = disc_diameter(shortfall)
+    return Sun(to_light, flux * (1 + np.cos(diameter / 2)) / 2, flux, diameter, stratum)
+
+
+def point_sun(flux: NDArray[np.float64], to_light: NDArray[np.float64], stratum: int) -> Sun:
+    """A light of no width (paper, 2.2): all of a cell's light from one direction."""
+    return Sun(to_light, flux, flux, 0.0, stratum)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from ..account import Account
 from ..conversion import Conversion
 from ..environment import scalar_irradiance
 from ..errors import UnusableInput
-from . import exr, lights_json
+from . import exr, lights_json, samples_json
 from .atomic import written_together
 from .preview import draw_preview
 
@@ -23,11 +23,13 @@ class WrittenFiles:
 
     lights: Path
     residual: Path | None
+    samples: Path | None
     preview: Path | None
 
 
 def save(conversion: Conversion, folder: str | Path, preview: bool = False) -> WrittenFiles:
-    """Write `<name>.lights.json`, `.residual.exr` and, if asked for, `.preview.png`.
+    """Write `<name>.lights.json`, `.residual.exr`, for a Voronoi map its `.samples.json` and, if
+    asked for, `.preview.png`.
 
     All of them appear, or none and the older ones stay. Raises CannotWrite.
     """
@@ -36,6 +38,8 @@ def save(conversion: Conversion, folder: str | Path, preview: bool = False) -> W
     names = {"lights": f"{stem}.lights.json"}
     if conversion.residual is not None:
         names["residual"] = f"{stem}.residual.exr"
+    if conversion.samples is not None:
+        names["samples"] = f"{stem}.samples.json"
     if preview:
         names["preview"] = f"{stem}.preview.png"
     with written_together(folder, list(names.values())) as drafts:
@@ -43,10 +47,12 @@ def save(conversion: Conversion, folder: str | Path, preview: bool = False) -> W
         lights_json.write(draft["lights"], describe(conversion))
         if conversion.residual is not None:
             exr.write(draft["residual"], conversion.residual)
+        if conversion.samples is not None:
+            samples_json.write(draft["samples"], conversion.samples, names["residual"])
         if preview:
             draw_preview(conversion).save(draft["preview"])
     paths = {kind: folder / name for kind, name in names.items()}
-    return WrittenFiles(paths["lights"], paths.get("residual"), paths.get("preview"))
+    return WrittenFiles(**{kind.name: paths.get(kind.name) for kind in fields(WrittenFiles)})
 
 
 def describe(conversion: Conversion) -> dict[str, Any]:
@@ -56,10 +62,14 @@ def describe(conversion: Conversion) -> dict[str, Any]:
     if conversion.residual is not None:
         height, width = conversion.residual.shape[:2]
         name = f"{environment.name}.residual.exr"
-        residual = {"file": name, "kind": "map", "width": width, "height": height}
+        kind = conversion.settings.residual
+        residual = {"file": name, "kind": kind, "width": width, "height": height}
+    if conversion.samples is not None:
+        residual["samples"] = f"{environment.name}.samples.json"
     settings = conversion.settings.as_dict() | {
         "share": conversion.strata.share,
         "threshold": conversion.strata.threshold,
+        "fill": conversion.settings.filled,
     }
     return {
         "source": {

@@ -27,7 +27,7 @@ def draw_preview(conversion: Conversion) -> Image.Image:
     environment = conversion.environment
     picture = Image.fromarray(tone_mapped(environment.radiance))
     picture = picture.resize((WIDTH, WIDTH // 2), Image.Resampling.BOX)
-    picture.paste(REGION, mask=_outline(conversion.strata.region_a))
+    picture.paste(REGION, mask=outline(conversion.strata.region_a, WIDTH))
     draw = ImageDraw.Draw(picture)
     font = ImageFont.load_default(15)
     for sun in conversion.suns:
@@ -43,11 +43,20 @@ def draw_preview(conversion: Conversion) -> Image.Image:
     return sheet
 
 
-def tone_mapped(radiance: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Radiance as sRGB bytes: the median luminance becomes a middle grey, highlights roll off."""
-    lum = luminance(radiance)
+def middle_of(lum: NDArray[np.float64]) -> float:
+    """The luminance that becomes a middle grey: the median of the pixels that shine."""
     lit = lum[lum > 0]
-    middle = float(np.median(lit)) if lit.size else 1.0
+    return float(np.median(lit)) if lit.size else 1.0
+
+
+def tone_mapped(radiance: NDArray[np.float32], middle: float | None = None) -> NDArray[np.uint8]:
+    """Radiance as sRGB bytes: `middle` becomes a middle grey, highlights roll off.
+
+    middle: a luminance, so that several pictures share it; by default the radiance's own median.
+    """
+    lum = luminance(radiance)
+    if middle is None:
+        middle = middle_of(lum)
     # In float64 by name: numpy 1.26 would stay in float32 and overflow at a bright sun.
     exposed = np.multiply(radiance, 0.18 / middle, dtype=np.float64)
     bright = (lum * (0.18 / middle))[..., None]
@@ -58,18 +67,22 @@ def tone_mapped(radiance: NDArray[np.float32]) -> NDArray[np.uint8]:
     return np.round(255 * np.where(mapped <= 0.0031308, low, high)).astype(np.uint8)
 
 
-def _outline(region: NDArray[np.bool_]) -> Image.Image:
-    """The pixels just outside of the region, at the size of the preview."""
+def most(values: NDArray, width: int) -> NDArray:
+    """A plane (H, W) at another size, (width / 2, width): the greatest value in each pixel.
+
+    So no pixel of a large map is lost between two of a picture; a small map is enlarged.
+    """
+    height, old_width = values.shape
+    rows = np.arange(width // 2) * height // (width // 2)
+    columns = np.arange(width) * old_width // width
+    return np.maximum.reduceat(np.maximum.reduceat(values, rows), columns, axis=1)
+
+
+def outline(region: NDArray[np.bool_], width: int) -> Image.Image:
+    """The pixels just outside of a region (H, W), as a mask for a picture of this width."""
     from scipy.ndimage import binary_dilation
 
-    scaled = Image.fromarray(region).resize((WIDTH, WIDTH // 2), Image.Resampling.NEAREST)
-    # One pixel of a large map may be lost between two of the preview; a group never all is.
-    if region.shape[1] > WIDTH:
-        rows, columns = np.nonzero(region)
-        small = np.array(scaled)
-        small[rows * (WIDTH // 2) // region.shape[0], columns * WIDTH // region.shape[1]] = True
-        scaled = Image.fromarray(small)
-    inside = np.array(scaled)
+    inside = most(region, width)
     return Image.fromarray(binary_dilation(inside, iterations=2) & ~inside)
 
 

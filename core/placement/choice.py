@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import sphere
 from ..cells import Cell
-from ..environment import EnvironmentMap
+from ..region import RegionLight, bright_groups
 from ..settings import ConversionSettings
 from ..strata import Strata
+from ..suns import Sun, disc_sun, point_sun
 from .groups import WIDEST_DISC, cut_misfits
+from .placement import ChosenSuns
 
 SMALLEST_SUN = 0.005
 """Part of all light below which the automatic choice makes no sun: nobody would see its shadow."""
@@ -18,23 +19,37 @@ WIDEST_OF_A_SHARE = np.radians(10)
 """Angular diameter above which cells of a share that the user has set are cut while lights last:
 a large region wants all the lights that it may have."""
 
+NO_SUN = "No pixel is much brighter than the rest: the map needs no sun."
+
+
+def edge_suns(light: RegionLight, strata: Strata, settings: ConversionSettings) -> ChosenSuns:
+    """Suns for the connected groups of region A, cut where a disc would cast wrong shadows."""
+    cells, notes = choose_cells(bright_groups(light, strata), strata, settings)
+    suns = tuple(_sun(cell, strata, settings) for cell in cells)
+    return ChosenSuns(suns, tuple(cells), tuple(notes))
+
+
+def _sun(cell: Cell, strata: Strata, settings: ConversionSettings) -> Sun:
+    flux = cell.flux.sum(axis=0)
+    brightest = float(strata.luminance.ravel()[cell.pixels].max())
+    stratum = strata.stratum(brightest)
+    if settings.shape == "point":
+        return point_sun(flux, cell.to_light, stratum)
+    return disc_sun(flux, cell.to_light, cell.shortfall, stratum)
+
 
 def choose_cells(
-    groups: list[Cell],
-    environment: EnvironmentMap,
-    strata: Strata,
-    settings: ConversionSettings,
+    groups: list[Cell], strata: Strata, settings: ConversionSettings
 ) -> tuple[list[Cell], list[str]]:
     """The cells that become suns, brightest first, and what the user should know of the rest."""
-    solid = sphere.row_solid_angles(environment.width, environment.height)
-    all_light = float(strata.luminance.sum(axis=1) @ solid)
+    all_light = strata.light
     groups = sorted(groups, key=lambda group: -group.total)
     if settings.share is not None:
         return _cells_of_a_share(groups, all_light, strata, settings)
     seen = [group for group in groups if group.total >= SMALLEST_SUN * all_light]
     notes = _left_out(groups[len(seen) :], f"each below {SMALLEST_SUN:.1%}", all_light)
     if not groups:
-        notes.append("No pixel is much brighter than the rest: the map needs no sun.")
+        notes.append(NO_SUN)
     cells, without_light = cut_misfits(seen, settings.lights, all_light)
     wide = [cell for cell in cells if cell.angular_diameter > WIDEST_DISC]
     cells = [cell for cell in cells if cell.angular_diameter <= WIDEST_DISC]

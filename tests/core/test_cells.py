@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from sunsplit.core import sphere
 from sunsplit.core.cells import Cell, split
 from sunsplit.core.environment import scalar_irradiance
-from sunsplit.core.suns import disc_sun
+from sunsplit.core.suns import Sun, disc_sun
 from tests.maps import direction, disc_energy, paint_disc, painted_radius, sky
 
 
@@ -19,6 +19,11 @@ def cell_of(pixels: np.ndarray) -> Cell:
     lit = np.flatnonzero(pixels.any(axis=-1))
     solid = sphere.row_solid_angles(width, height)[lit // width, None]
     return Cell.of(lit, pixels.reshape(-1, 3)[lit] * solid, width, height)
+
+
+def sun_of(pixels: np.ndarray) -> Sun:
+    cell = cell_of(pixels)
+    return disc_sun(cell.flux.sum(axis=0), cell.to_light, cell.shortfall, 1)
 
 
 PLACES = {
@@ -34,7 +39,7 @@ PLACES = {
 def test_a_disc_gives_itself_back(place, radius):
     pixels = sky(1024, 0.0)
     paint_disc(pixels, place, radius, (3, 2, 1))
-    sun = disc_sun(cell_of(pixels), 1)
+    sun = sun_of(pixels)
     assert np.degrees(sphere.angle_between(sun.to_light, place)) < 0.02
     expected = 2 * painted_radius(radius, 1024, place)
     assert np.degrees(sun.angular_diameter) == pytest.approx(expected, rel=0.01, abs=0.04)
@@ -46,11 +51,8 @@ def test_a_disc_gives_itself_back(place, radius):
 @given(st.floats(0.5, 89))
 def test_irradiance_of_a_disc_in_closed_form(radius):
     """A uniform cap of radiance L gives a facing surface pi L sin^2 a."""
-    pixels = sky(64, 0.0)
-    pixels[3, 3] = 1
-    one = cell_of(pixels)
-    spread = np.array([(1 - np.cos(np.radians(radius))) / 2])
-    sun = disc_sun(Cell(one.pixels, one.flux, one.directions, spread), 1)
+    shortfall = (1 - np.cos(np.radians(radius))) / 2
+    sun = disc_sun(np.array([3.0, 2, 1]), np.array([0.0, 0, 1]), shortfall, 1)
     assert np.degrees(sun.angular_diameter) == pytest.approx(2 * radius, rel=1e-9)
     expected = np.pi * sun.radiance * np.sin(np.radians(radius)) ** 2
     assert sun.irradiance == pytest.approx(expected, rel=1e-9)
@@ -60,7 +62,7 @@ def test_irradiance_of_a_disc_in_closed_form(radius):
 def test_one_pixel_is_as_large_as_itself(row):
     pixels = sky(512, 0.0)
     pixels[row, 7] = 1e5
-    sun = disc_sun(cell_of(pixels), 1)
+    sun = sun_of(pixels)
     high = np.pi / 256
     wide = high * np.sin((row + 0.5) * high)
     # The disc's second moment is a^2 / 2, the pixel's (w^2 + h^2) / 12.

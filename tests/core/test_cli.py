@@ -81,6 +81,7 @@ def test_json_is_one_object_and_nothing_else(sky_file, out, capfd):
     assert answer["files"] == {
         "lights": str(out / "map.lights.json"),
         "residual": str(out / "map.residual.exr"),
+        "samples": None,
         "preview": str(out / "map.preview.png"),
     }
     written = json.loads((out / "map.lights.json").read_text())
@@ -91,8 +92,16 @@ def test_json_is_one_object_and_nothing_else(sky_file, out, capfd):
         "lights": 16,
         "share": 0,
         "strata": 2,
+        "method": "edge",
+        "samples": None,
+        "per_stratum": False,
+        "shape": "disc",
+        "position": "centroid",
+        "frequency": "energy",
         "residual": "map",
         "residual_width": None,
+        "residual_samples": 500,
+        "fill": "surroundings",
         "threshold": 0,
     }
 
@@ -131,6 +140,35 @@ def test_settings_arrive(sky_file, out, capfd):
     assert (answer["settings"]["lights"], answer["settings"]["strata"]) == (3, 4)
     assert 1 <= len(answer["suns"]) <= 3
     assert run("convert", sky_file, "-o", out, "--share", "auto") == 0
+
+
+def test_the_papers_settings_arrive(sky_file, out, capfd):
+    options = {
+        "method": "penrose",
+        "samples": 40,
+        "shape": "point",
+        "position": "sample",
+        "frequency": "mean",
+        "residual": "voronoi",
+        "residual_samples": 30,
+        "residual_width": 32,
+        "fill": "surroundings",
+        "share": 0.5,
+    }
+    words = [
+        word
+        for key, value in options.items()
+        for word in (f"--{key.replace('_', '-')}", f"{value}")
+    ]
+    assert run("convert", sky_file, "-o", out, "--json", "--per-stratum", *words) == 0
+    answer = json.loads(capfd.readouterr().out)
+    assert names(out) == ["map.lights.json", "map.residual.exr", "map.samples.json"]
+    assert answer["files"]["samples"] == str(out / "map.samples.json")
+    settings = answer["settings"] | {"share": 0.5}
+    assert settings | options | {"per_stratum": True} == settings
+    assert answer["residual"]["kind"] == "voronoi"
+    assert answer["residual"]["samples"] == "map.samples.json"
+    assert all(sun["angular_diameter"] == 0 for sun in answer["suns"])
 
 
 def test_repairs_and_warnings_are_said(tmp_path, out, capfd):
@@ -173,7 +211,9 @@ def test_any_file_name(tmp_path, out, name, capfd):
         ["convert"],
         ["convert", "map.exr", "--lights", "0"],
         ["convert", "map.exr", "--lights", "many"],
-        ["convert", "map.exr", "--share", "0"],
+        ["convert", "map.exr", "--share", "-0.1"],
+        ["convert", "map.exr", "--method", "magic"],
+        ["convert", "map.exr", "--samples", "0"],
         ["convert", "map.exr", "--share", "1.1"],
         ["convert", "map.exr", "--share", "nan"],
         ["convert", "map.exr", "--strata", "3"],
@@ -392,7 +432,7 @@ def test_help_waits_for_no_library(arguments):
 def test_help_names_every_option(capfd):
     assert cli.main(["convert", "--help"]) == 0
     said = capfd.readouterr().out
-    for option in ("--output", "--lights", "--share", "--strata", "--residual", "--preview"):
+    for option in ("--output", "--lights", "--share", "--method", "--residual", "--preview"):
         assert option in said
     assert "--json" in said
     assert "--allow-ldr" in said

@@ -190,7 +190,7 @@ def test_the_real_map(sunrise):
 
 @pytest.mark.parametrize(
     "bad",
-    [{"lights": 0}, {"share": 0}, {"share": 1.5}, {"strata": 3}, {"residual": "hole"}],
+    [{"lights": 0}, {"share": -0.1}, {"share": 1.5}, {"strata": 3}, {"residual": "hole"}],
 )
 def test_settings_outside_their_limits_say_so(bad):
     with pytest.raises(BadSetting, match=next(iter(bad))):

@@ -1,0 +1,65 @@
+"""What every method of placement takes and gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import sphere
+from ..cells import Cell
+from ..region import RegionLight
+from ..suns import Sun
+from ..voronoi import label_map, nearest
+
+DENSE = 1 / 16
+"""Part of a map's pixels from which labelling the whole map is faster than asking for each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Samples of a region's light and the cell of each.
+
+    sites: unit vectors (n, 3), at most as many as were asked for. given: the owner of each pixel
+    where the method itself says so; None: the nearest site on the sphere.
+    """
+
+    sites: NDArray[np.float64]
+    light: RegionLight
+    given: NDArray[np.intp] | None = None
+
+    @cached_property
+    def owner(self) -> NDArray[np.intp]:
+        """For each pixel of the region the site whose cell it lies in, (p,)."""
+        return _nearest_sites(self.light, self.sites) if self.given is None else self.given
+
+
+@dataclass(frozen=True, eq=False)
+class ChosenSuns:
+    """Suns, brightest first, the light of the map that they replace, and notes for the user."""
+
+    suns: tuple[Sun, ...]
+    replaced: tuple[Cell | RegionLight, ...]
+    notes: tuple[str, ...]
+
+
+Place = Callable[[RegionLight, int], Placement]
+"""A method: it takes light, of which some must be there, and how many samples to place in it."""
+
+
+def _nearest_sites(light: RegionLight, sites: NDArray[np.float64]) -> NDArray[np.intp]:
+    if len(light.pixels) > DENSE * light.width * light.height:
+        labels = label_map(sites, light.width, light.height)
+        return labels.ravel()[light.pixels].astype(np.intp)
+    return nearest(sphere.pixel_centres(light.pixels, light.width, light.height), sites)
+
+
+def method_named(name: str) -> Place:
+    """The placement method of that name; each is imported when it is first used."""
+    from importlib import import_module
+
+    module = {"median-cut": "boxes", "variance": "boxes", "penrose": "tiled"}.get(name, name)
+    return getattr(import_module(f".{module}", __package__), name.replace("-", "_"))

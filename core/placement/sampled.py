@@ -1,0 +1,158 @@
+"""Suns from samples of region A: placed by importance, clustered, one light for each cell.
+
+The paper's way: samples (2.1), their spherical Voronoi cells and a directional light for each
+(2.2), after samples that lie too close have been clustered (section 3).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cluster import merge
+from ..environment import LUMINANCE_WEIGHTS
+from ..moments import moments_of
+from ..region import RegionLight
+from ..settings import ConversionSettings
+from ..strata import Strata
+from ..suns import Sun, disc_sun, point_sun
+from .choice import NO_SUN
+from .placement import ChosenSuns, Place, Placement, method_named
+
+MOST_SAMPLES = 256
+"""At most so many samples are tried for each light."""
+
+LIMIT_OF_SAMPLES = 200_000
+"""And so many in all: placing them takes some seconds."""
+
+
+def sampled_suns(light: RegionLight, strata: Strata, settings: ConversionSettings) -> ChosenSuns:
+    """At most `settings.lights` suns that hold all of the light."""
+    light = light.part(light.luminous_flux > 0)
+    if not len(light.pixels):
+        return ChosenSuns((), (), () if settings.share == 0 else (NO_SUN,))
+    parts, notes = [light], []
+    if settings.per_stratum:
+        parts = _by_stratum(light, strata)
+        if len(parts) > settings.lights:
+            notes.append(f"{len(parts)} strata want as many lights: placed in all of them at once.")
+            parts = [light]
+    suns = []
+    for part, lights in zip(parts, _shared_out(parts, settings.lights), strict=True):
+        placement = sample(part, int(lights), settings, _samples(lights, settings))
+        suns += _suns(part, placement, strata, settings)
+    suns.sort(key=lambda sun: -float(sun.scalar_irradiance @ LUMINANCE_WEIGHTS))
+    if len(suns) < settings.lights:
+        notes.append(_fewer(len(suns), light, settings))
+    return ChosenSuns(tuple(suns), (light,), tuple(notes))
+
+
+def _samples(lights: int, settings: ConversionSettings) -> int | None:
+    """How many samples the user wants for a part of the lights."""
+    if settings.samples is None:
+        return None
+    return max(round(lights * settings.samples / settings.lights), 1)
+
+
+def sample(
+    light: RegionLight, count: int, settings: ConversionSettings, samples: int | None = None
+) -> Placement:
+    """At most `count` samples no nearer than a pixel to one another; what is, gets clustered.
+
+    light: of pixels that all shine. samples: place so many, and cluster them down to `count`;
+    None: as few as leave `count`. Each of the sites that come out has a cell that shines.
+    """
+    name = "penrose" if settings.method == "edge" else settings.method
+    place = method_named(name)
+    placement = place(light, samples) if samples else _enough(light, place, count)
+    moments = moments_of(light, placement.owner, len(placement.sites))
+    kept = np.flatnonzero(moments.luminous_flux > 0)
+    number = np.zeros(len(placement.sites), np.intp)
+    number[kept] = np.arange(len(kept))
+    clusters = merge(
+        placement.sites[kept],
+        moments.luminous_flux[kept],
+        moments.area[kept],
+        settings.frequency,
+        nearer_than=np.pi / light.height,
+        down_to=count,
+    )
+    if len(clusters.centres) > count:  # too far apart to have a mean
+        return sample(light, count, settings, count)
+    return Placement(clusters.centres, light, clusters.label[number[placement.owner]])
+
+
+def _enough(light: RegionLight, place: Place, count: int) -> Placement:
+    """The fewest samples, to a fiftieth, that leave `count` once those too near are clustered.
+
+    A peak draws many samples into one pixel (paper, section 3), and more go elsewhere only with
+    a larger number of them all.
+    """
+    placement = place(light, count)
+    if len(light.pixels) <= count or len(placement.sites) < count:
+        return placement
+    low = high = count
+    while _apart(placement) < count and high < min(count * MOST_SAMPLES, LIMIT_OF_SAMPLES):
+        low, high = high, 2 * high
+        placement = place(light, high)
+    while high - low > 1 + low // 50:
+        middle = (low + high) // 2
+        fewer = place(light, middle)
+        if _apart(fewer) < count:
+            low = middle
+        else:
+            high, placement = middle, fewer
+    return placement
+
+
+def _apart(placement: Placement) -> int:
+    """How many samples are left when those nearer than a pixel are clustered."""
+    alike = np.ones(len(placement.sites))
+    near = np.pi / placement.light.height
+    return len(merge(placement.sites, alike, alike, "one", nearer_than=near).centres)
+
+
+def _suns(
+    light: RegionLight, placement: Placement, strata: Strata, settings: ConversionSettings
+) -> list[Sun]:
+    count = len(placement.sites)
+    moments = moments_of(light, placement.owner, count)
+    brightest = np.zeros(count)
+    np.maximum.at(brightest, placement.owner, strata.luminance.ravel()[light.pixels])
+    to_light = placement.sites if settings.position == "sample" else moments.to_light
+    return [
+        point_sun(moments.flux[i], to_light[i], strata.stratum(brightest[i]))
+        if settings.shape == "point"
+        else disc_sun(
+            moments.flux[i], to_light[i], moments.shortfall[i], strata.stratum(brightest[i])
+        )
+        for i in range(count)
+    ]
+
+
+def _by_stratum(light: RegionLight, strata: Strata) -> list[RegionLight]:
+    """The light of each bright stratum that holds any, the darkest first."""
+    number = np.searchsorted(strata.bounds, strata.luminance.ravel()[light.pixels]) + 1
+    # The rim of a light may be darker than region A, but belongs to it.
+    number = np.maximum(number, strata.count // 2 + 1)
+    return [light.part(number == k) for k in np.unique(number)]
+
+
+def _shared_out(parts: list[RegionLight], lights: int) -> NDArray[np.intp]:
+    """Lights in proportion to each part's light, one at least."""
+    weight = np.array([part.luminous_flux.sum() for part in parts])
+    wanted = weight / weight.sum() * (lights - len(parts))
+    shares = np.floor(wanted).astype(np.intp)
+    largest = np.argsort(shares - wanted, kind="stable")[: lights - len(parts) - shares.sum()]
+    shares[largest] += 1
+    return shares + 1
+
+
+def _fewer(count: int, light: RegionLight, settings: ConversionSettings) -> str:
+    if settings.samples and settings.samples < settings.lights:
+        why = f"{settings.samples} samples were placed"
+    elif len(light.pixels) <= settings.lights:
+        why = f"region A has only {len(light.pixels)} pixels that shine"
+    else:
+        why = "samples nearer than a pixel were clustered"
+    return f"{count} of {settings.lights} lights: {why}."

@@ -1,0 +1,58 @@
+"""What a map would show inside a region without the region's own light."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import sphere
+
+LARGE = 40_000
+"""Pixels above which a group gets the mean of its rim instead of a smooth fill: a region that
+large has no one surroundings, and solving for it would take seconds."""
+
+
+def surroundings(radiance: NDArray[np.float32], region: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """What the map would show inside a region without the region's own light.
+
+    The values around the region are carried into it by Laplace's equation, the smoothest surface
+    over a given rim; it has no bump or hole of its own and no favourite direction.
+    region: mask (height, width). Returns radiance (n, 3) of the region's pixels in reading order,
+    never above the map's own; 0 where the whole map is region.
+    """
+    height, width = region.shape
+    flat = radiance.reshape(-1, 3)
+    labels, count = sphere.connected_groups(region)
+    pixels = np.flatnonzero(region)
+    result = np.zeros((len(pixels), 3), np.float32)
+    for group in sphere.group_pixels(labels, count):
+        near = sphere.neighbours(group, width, height)
+        outside = ~region.ravel()[near]
+        if not outside.any():
+            continue
+        rim = flat[near[outside]].mean(axis=0, dtype=np.float64)
+        smooth = rim if len(group) > LARGE else _harmonic(flat, group, near, outside)
+        inside = np.searchsorted(pixels, group)
+        result[inside] = np.minimum(smooth.astype(np.float32), flat[group])
+    return result
+
+
+def _harmonic(
+    flat: NDArray[np.float32],
+    group: NDArray[np.intp],
+    near: NDArray[np.intp],
+    outside: NDArray[np.bool_],
+) -> NDArray[np.float64]:
+    """Each pixel of the group the mean of its four neighbours; those outside are given."""
+    from scipy.sparse import csc_array
+    from scipy.sparse.linalg import splu
+
+    count = len(group)
+    own = np.arange(count)
+    row, side = np.nonzero(~outside)
+    column = np.searchsorted(group, near[row, side])
+    values = np.concatenate([np.full(count, 4.0), np.full(len(row), -1.0)])
+    places = np.concatenate([own, row]), np.concatenate([own, column])
+    matrix = csc_array((values, places), shape=(count, count))
+    given = np.where(outside[..., None], flat[near], 0).sum(axis=1, dtype=np.float64)
+    return np.maximum(splu(matrix).solve(given), 0)
