@@ -3,33 +3,25 @@
 Velho, Gomes, Sobreiro (1997) merge the pair (i, j) of least cost
     E = F_i F_j / (F_i + F_j) angle(c_i, c_j)^2   into   c = (F_i c_i + F_j c_j) / (F_i + F_j)
 again and again. What merges here, and in which order, is what comparing all pairs each time gives,
-for each frequency F. Each merge looks at all clusters once or twice: N^2 at 20 ns, not N^3.
+for each frequency F. Each merge looks at all clusters once or twice: N^2 in all, not N^3.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .settings import Frequency
 from .sphere import angle_between
+from .tolerances import NEGLIGIBLE, ROUNDING
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-Frequency = Literal["one", "energy", "mean"]
-"""F of the paper: 1; the integral of L over the sample's cell; that by the cell's area."""
-
 WIDEST = np.pi / 2 * (1 + 1e-12)
 """Clusters as far apart or farther never merge, as antipodes have no mean; right angles may."""
-
-ROUNDING = 1e-14
-"""By so much a squared chord from a dot product may be too large: 2 - 2 cos is wrong by 2e-15."""
-
-NEGLIGIBLE = 1e-100
-"""Part of the largest F below which F counts as 0, so that 1 / F and all costs stay finite."""
 
 NOBODY = 1e300
 """The cost of a pair that does not exist."""

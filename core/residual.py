@@ -12,9 +12,7 @@ from .cells import Cell
 from .environment import EnvironmentMap
 from .errors import UnusableInput
 from .region import RegionLight
-
-ROUNDED = 8 * np.finfo(np.float64).eps
-"""Part of a pixel that a product with its solid angle and a division by it may change."""
+from .tolerances import ROUNDED
 
 
 def without(

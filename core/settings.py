@@ -11,6 +11,7 @@ Method = Literal["edge", "penrose", "median-cut", "variance", "kmeans"]
 Shape = Literal["disc", "point"]
 Position = Literal["centroid", "sample"]
 Frequency = Literal["one", "energy", "mean"]
+"""F of the paper: 1; the integral of L over the sample's cell; that by the cell's area."""
 ResidualKind = Literal["map", "voronoi", "none"]
 Fill = Literal["surroundings", "black"]
 

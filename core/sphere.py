@@ -47,6 +47,13 @@ def pixel_centres(indices: NDArray[np.intp], width: int, height: int) -> Floats:
     return to_directions((columns + 0.5) / width, (rows + 0.5) / height)
 
 
+def pixels_at(directions: ArrayLike, width: int, height: int) -> NDArray[np.intp]:
+    """Flat indices of the pixels that these unit vectors (n, 3) point into, (n,)."""
+    u, v = to_image(directions)
+    column = np.floor(u * width).astype(np.intp) % width
+    return np.minimum((v * height).astype(np.intp), height - 1) * width + column
+
+
 def centroid_angles(width: int, height: int) -> tuple[Floats, Floats]:
     """Azimuth of each column, (width,), and polar angle of each row's centroid, (height,)."""
     rows = np.arange(height)

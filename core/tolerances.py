@@ -19,3 +19,16 @@ HALF_MAXIMUM = 65504.0
 EQUIVARIANCE = 1e-6
 """How far suns may differ, relatively, between a map and the same map turned or mirrored: what is
 filled in under a sun is stored as float32, and the solver's last digit decides how it rounds."""
+
+TIE = 1e-14
+"""Chords that differ by less are equal, and the lowest index wins: a unit vector made of a pixel's
+position is wrong by up to 1e-15, and no tie by symmetry would survive that."""
+
+ROUNDING = 1e-14
+"""By so much a squared chord from a dot product may be too large: 2 - 2 cos is wrong by 2e-15."""
+
+NEGLIGIBLE = 1e-100
+"""Part of the largest F below which F counts as 0, so that 1 / F and all costs stay finite."""
+
+ROUNDED = 8 * 2.0**-52
+"""Part of a pixel that a product with its solid angle and a division by it may change."""

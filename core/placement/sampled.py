@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import sphere
 from ..cluster import merge
 from ..environment import LUMINANCE_WEIGHTS
 from ..moments import moments_of
@@ -24,6 +25,13 @@ MOST_SAMPLES = 256
 
 LIMIT_OF_SAMPLES = 200_000
 """And so many in all: placing them takes some seconds."""
+
+A_PIXEL = 0.99
+"""Distance, in heights of a pixel, below which samples are clustered: just less than one, so that
+pixels one above the other stay two. Near the poles those side by side do not."""
+
+ROUNDS = 5
+"""How often more samples are tried: some that have pixels of their own are clustered still."""
 
 
 def sampled_suns(light: RegionLight, strata: Strata, settings: ConversionSettings) -> ChosenSuns:
@@ -62,10 +70,64 @@ def sample(
     light: of pixels that all shine. samples: place so many, and cluster them down to `count`;
     None: as few as leave `count`. Each of the sites that come out has a cell that shines.
     """
-    name = "penrose" if settings.method == "edge" else settings.method
-    place = method_named(name)
-    placement = place(light, samples) if samples else _enough(light, place, count)
-    moments = moments_of(light, placement.owner, len(placement.sites))
+    place = method_named("penrose" if settings.method == "edge" else settings.method)
+    if samples:
+        clustered = _clustered(place(light, samples), count, settings)
+    else:
+        clustered = _as_many(light, place, count, settings)
+    if len(clustered.sites) > count:  # so far apart that they have no mean
+        return _clustered(place(light, count), count, settings)
+    return clustered
+
+
+def _as_many(
+    light: RegionLight, place: Place, count: int, settings: ConversionSettings
+) -> Placement:
+    """`count` samples after clustering, where the map has room for them."""
+    wanted = count
+    for _ in range(ROUNDS):
+        placement = _enough(light, place, wanted)
+        clustered = _clustered(placement, count, settings)
+        missing = count - len(clustered.sites)
+        if missing <= 0 or _pixels_met(placement) < wanted:
+            break
+        wanted += missing
+    return clustered
+
+
+def _enough(light: RegionLight, place: Place, count: int) -> Placement:
+    """The fewest samples, to a fiftieth, that meet `count` pixels, or as many as do.
+
+    A peak draws many samples into one pixel (paper, section 3), and more go elsewhere only with
+    a larger number of them all.
+    """
+    if len(light.pixels) <= count:  # one for each pixel
+        return Placement(sphere.pixel_directions(light.pixels, light.width, light.height), light)
+    placement = place(light, count)
+    low = high = count
+    while _pixels_met(placement) < count and high < min(count * MOST_SAMPLES, LIMIT_OF_SAMPLES):
+        low, high = high, 2 * high
+        placement = place(light, high)
+    while high - low > 1 + low // 50:
+        middle = (low + high) // 2
+        fewer = place(light, middle)
+        if _pixels_met(fewer) < count:
+            low = middle
+        else:
+            high, placement = middle, fewer
+    return placement
+
+
+def _pixels_met(placement: Placement) -> int:
+    """In how many pixels the samples lie: no fewer than are left when they are clustered."""
+    light = placement.light
+    return len(np.unique(sphere.pixels_at(placement.sites, light.width, light.height)))
+
+
+def _clustered(placement: Placement, count: int, settings: ConversionSettings) -> Placement:
+    """Without samples that have no light of their own, as another is nearer to each pixel; those
+    that are nearer to one another than a pixel merged, and then down to `count`."""
+    moments = moments_of(placement.light, placement.owner, len(placement.sites))
     kept = np.flatnonzero(moments.luminous_flux > 0)
     number = np.zeros(len(placement.sites), np.intp)
     number[kept] = np.arange(len(kept))
@@ -74,42 +136,11 @@ def sample(
         moments.luminous_flux[kept],
         moments.area[kept],
         settings.frequency,
-        nearer_than=np.pi / light.height,
+        nearer_than=A_PIXEL * np.pi / placement.light.height,
         down_to=count,
     )
-    if len(clusters.centres) > count:  # too far apart to have a mean
-        return sample(light, count, settings, count)
-    return Placement(clusters.centres, light, clusters.label[number[placement.owner]])
-
-
-def _enough(light: RegionLight, place: Place, count: int) -> Placement:
-    """The fewest samples, to a fiftieth, that leave `count` once those too near are clustered.
-
-    A peak draws many samples into one pixel (paper, section 3), and more go elsewhere only with
-    a larger number of them all.
-    """
-    placement = place(light, count)
-    if len(light.pixels) <= count or len(placement.sites) < count:
-        return placement
-    low = high = count
-    while _apart(placement) < count and high < min(count * MOST_SAMPLES, LIMIT_OF_SAMPLES):
-        low, high = high, 2 * high
-        placement = place(light, high)
-    while high - low > 1 + low // 50:
-        middle = (low + high) // 2
-        fewer = place(light, middle)
-        if _apart(fewer) < count:
-            low = middle
-        else:
-            high, placement = middle, fewer
-    return placement
-
-
-def _apart(placement: Placement) -> int:
-    """How many samples are left when those nearer than a pixel are clustered."""
-    alike = np.ones(len(placement.sites))
-    near = np.pi / placement.light.height
-    return len(merge(placement.sites, alike, alike, "one", nearer_than=near).centres)
+    owner = clusters.label[number[placement.owner]]
+    return Placement(clusters.centres, placement.light, owner)
 
 
 def _suns(

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sunsplit.core.cluster import Clusters, merge
@@ -86,12 +86,14 @@ def test_larger_sets_than_a_tree_finds_at_once(frequency):
     assert_same(merge(*arguments), all_pairs(*arguments))
 
 
+@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(FREQUENCIES), st.sampled_from([None, 1, 7]))
 def test_the_order_of_samples_does_not_matter(seed, frequency, down_to):
     rng = np.random.default_rng(seed)
     sites, energy, area = samples(rng, 40)
     # Many ties: a grid, equal and no energies, and equal samples.
-    sites = np.round(sites * 2) + [0.0, 0.0, 0.1]
+    sites = np.round(sites * 2)
+    sites[:, 2] += 0.1
     sites /= np.linalg.norm(sites, axis=1)[:, None]
     energy, area = np.floor(energy), np.ones(40)
     order = rng.permutation(40)
@@ -104,6 +106,7 @@ def test_the_order_of_samples_does_not_matter(seed, frequency, down_to):
     assert sorted(straight.centres.tolist()) == sorted(shuffled.centres.tolist())
 
 
+@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(FREQUENCIES), st.integers(-40, 40))
 def test_brightness_does_not_matter(seed, frequency, power):
     sites, energy, area = samples(np.random.default_rng(seed), 30)
@@ -132,12 +135,12 @@ def test_without_a_distance_nothing_merges_not_even_equals(frequency):
 
 
 def test_no_two_centres_are_left_nearer_than_asked():
-    sites, energy, area = samples(np.random.default_rng(3), 2000)
+    sites, energy, area = samples(np.random.default_rng(3), 1000)
     for frequency in FREQUENCIES:
         found = merge(sites, energy, area, frequency, 0.1)
         apart = angle_between(found.centres[:, None], found.centres[None])
         assert apart[~np.eye(len(apart), dtype=bool)].min() >= 0.1
-        assert len(found.centres) == found.label.max() + 1 < 2000
+        assert len(found.centres) == found.label.max() + 1 < 1000
 
 
 @pytest.mark.parametrize("frequency", FREQUENCIES)
@@ -183,7 +186,7 @@ def test_the_mean_radiance_is_not_additive():
 def test_additive_centres_are_the_means_of_their_samples(frequency):
     """In a small patch, where a sphere is a plane, whatever the order of the merges was."""
     sites, energy, area = samples(np.random.default_rng(8), 500, 1e-5)
-    found = merge(sites, energy, area, frequency, 1e-5, 20)
+    found = merge(sites, energy, area, frequency, 0, 20)
     weight = np.ones(500) if frequency == "one" else energy
     sums = np.zeros((20, 3))
     np.add.at(sums, found.label, weight[:, None] * sites)
@@ -206,11 +209,11 @@ def test_energy_that_is_no_energy_is_refused(bad):
 
 
 def test_twenty_thousand_samples():
-    """Half of them crowded, as around a sun."""
+    """A fifth of them crowded, as around a sun."""
     rng = np.random.default_rng(1)
     sites, energy, area = samples(rng, 20_000)
-    sites[:10_000] = [0, 0, 1] + 0.01 * sites[:10_000]
+    sites[:4_000] = [0, 0, 1] + 0.01 * sites[:4_000]
     sites /= np.linalg.norm(sites, axis=1)[:, None]
     found = merge(sites, energy, area, "energy", 2 * np.pi / 1024)
-    assert 9_000 < len(found.centres) < 19_000
+    assert 14_000 < len(found.centres) < 16_000
     assert len(np.unique(found.label)) == len(found.centres)
