@@ -83,13 +83,13 @@ def test_every_setting_of_the_core_is_a_choice_with_the_same_default(scene):
     assert set(CHOICES) == {*asdict(ConversionSettings()), "share_auto"}
 
 
-def test_an_automatic_fill_or_a_chosen_one(scene):
-    bpy.ops.sunsplit.convert(share=0.5, method="kmeans", fill="surroundings")
-    image = scene.world.node_tree.nodes["Sunsplit: Residual"].image
-    pixels = np.empty(1024 * 512 * 4, np.float32)
-    image.pixels.foreach_get(pixels)
-    assert pixels.reshape(-1, 4)[:, :3].min() > 0
-    bpy.ops.sunsplit.convert(share=0.5, method="kmeans", fill="auto")
-    image = scene.world.node_tree.nodes["Sunsplit: Residual"].image
-    image.pixels.foreach_get(pixels)
-    assert pixels.reshape(-1, 4)[:, :3].min() == 0
+def test_an_automatic_fill_or_a_chosen_one(scene, sunrise):
+    sun = np.flatnonzero(convert(load(sunrise), ConversionSettings(share=0.5)).strata.region_a)
+    row, column = np.divmod(sun, 1024)
+    for fill, black in (("surroundings", False), ("auto", True), ("black", True)):
+        bpy.ops.sunsplit.convert(share=0.5, method="kmeans", fill=fill)
+        image = scene.world.node_tree.nodes["Sunsplit: Residual"].image
+        pixels = np.empty(1024 * 512 * 4, np.float32)
+        image.pixels.foreach_get(pixels)
+        shown = pixels.reshape(512, 1024, 4)[::-1][row, column, :3]
+        assert (shown == 0).all() == black
