@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,56 +20,72 @@ AT_ONCE = 1 << 20
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Of n cells. flux: scalar irradiance, (n, 3). luminous_flux: its luminance, (n,).
+    """Sums over the cells of a light, each made when it is first asked for.
 
-    area: of the pixels, steradians, (n,). to_light: unit vector of the mean direction, (n, 3); of
-    the brightest pixel where there is none. shortfall: 1 - R, see `Cell.shortfall`, (n,).
+    owner: the cell of each pixel of the light, (p,). count: of cells, n.
     """
 
-    flux: Floats
-    luminous_flux: Floats
-    area: Floats
-    to_light: Floats
-    shortfall: Floats
+    light: RegionLight
+    owner: NDArray[np.intp]
+    count: int
 
+    @cached_property
+    def flux(self) -> Floats:
+        """Scalar irradiance of each cell, (n, 3)."""
+        channels = [np.bincount(self.owner, one, self.count) for one in self.light.flux.T]
+        return np.stack(channels, axis=-1)
 
-def moments_of(light: RegionLight, owner: NDArray[np.intp], count: int) -> Moments:
-    """Moments of `count` cells; owner: the cell of each pixel of the light, (p,)."""
-    flux = np.stack([np.bincount(owner, channel, count) for channel in light.flux.T], axis=-1)
-    luminous = np.bincount(owner, light.luminous_flux, count)
-    solid = sphere.row_solid_angles(light.width, light.height)
-    area = np.bincount(owner, solid[light.pixels // light.width], count)
-    to_light = _mean_directions(light, owner, luminous)
-    apart = np.zeros(count)
-    for part in _blocks(light):
-        pixels, weight, of = light.pixels[part], light.luminous_flux[part], owner[part]
-        directions = sphere.pixel_directions(pixels, light.width, light.height)
-        own = ((directions - to_light[of]) ** 2).sum(axis=1) / 2
-        own += sphere.pixel_spread(pixels, light.width, light.height)
-        apart += np.bincount(of, weight * own, count)
-    shortfall = np.divide(apart, luminous, out=np.zeros(count), where=luminous > 0)
-    return Moments(flux, luminous, area, to_light, shortfall)
+    @cached_property
+    def luminous_flux(self) -> Floats:
+        """Its luminance, (n,)."""
+        return np.bincount(self.owner, self.light.luminous_flux, self.count)
 
+    @cached_property
+    def area(self) -> Floats:
+        """Of each cell's pixels, steradians, (n,)."""
+        solid = sphere.row_solid_angles(self.light.width, self.light.height)
+        return np.bincount(self.owner, solid[self.light.pixels // self.light.width], self.count)
 
-def _mean_directions(light: RegionLight, owner: NDArray[np.intp], luminous: Floats) -> Floats:
-    count = len(luminous)
-    total = np.zeros((count, 3))
-    for part in _blocks(light):
-        directions = sphere.pixel_directions(light.pixels[part], light.width, light.height)
-        weighted = directions * light.luminous_flux[part, None]
-        for axis in range(3):
-            total[:, axis] += np.bincount(owner[part], weighted[:, axis], count)
-    length = np.linalg.norm(total, axis=1)
-    lost = length <= 1e-9 * luminous  # light from all sides, or none at all
-    total[~lost] /= length[~lost, None]
-    if lost.any():
-        # Written in rising order of brightness, so the brightest stays; the first of equals.
-        order = np.argsort(light.luminous_flux[::-1], kind="stable")
-        brightest = np.zeros(count, np.intp)
-        brightest[owner[::-1][order]] = light.pixels[::-1][order]
-        total[lost] = sphere.pixel_directions(brightest[lost], light.width, light.height)
-    return total
+    @cached_property
+    def vector(self) -> Floats:
+        """Sum of luminous flux times direction, (n, 3)."""
+        total = np.zeros((self.count, 3))
+        for part, directions in self._blocks():
+            for axis in range(3):
+                weighted = directions[:, axis] * self.light.luminous_flux[part]
+                total[:, axis] += np.bincount(self.owner[part], weighted, self.count)
+        return total
 
+    @cached_property
+    def to_light(self) -> Floats:
+        """Unit vectors of the mean directions, (n, 3); of the brightest pixel where is none."""
+        length = np.linalg.norm(self.vector, axis=1)
+        lost = length <= 1e-9 * self.luminous_flux  # light from all sides, or none at all
+        unit = self.vector / np.where(lost, 1, length)[:, None]
+        if lost.any():
+            # Written in rising order of brightness, so the brightest stays; the first of equals.
+            order = np.argsort(self.light.luminous_flux[::-1], kind="stable")
+            brightest = np.zeros(self.count, np.intp)
+            brightest[self.owner[::-1][order]] = self.light.pixels[::-1][order]
+            size = self.light.width, self.light.height
+            unit[lost] = sphere.pixel_directions(brightest[lost], *size)
+        return unit
 
-def _blocks(light: RegionLight) -> list[slice]:
-    return [slice(start, start + AT_ONCE) for start in range(0, len(light.pixels), AT_ONCE)]
+    @cached_property
+    def shortfall(self) -> Floats:
+        """1 - R of each cell, (n,); see `Cell.shortfall`."""
+        apart = np.zeros(self.count)
+        for part, directions in self._blocks():
+            owner = self.owner[part]
+            own = ((directions - self.to_light[owner]) ** 2).sum(axis=1) / 2
+            own += sphere.pixel_spread(self.light.pixels[part], self.light.width, self.light.height)
+            apart += np.bincount(owner, self.light.luminous_flux[part] * own, self.count)
+        lit = self.luminous_flux > 0
+        return np.divide(apart, self.luminous_flux, out=np.zeros(self.count), where=lit)
+
+    def _blocks(self) -> Iterator[tuple[slice, Floats]]:
+        """Parts of the pixels with their directions."""
+        for start in range(0, len(self.light.pixels), AT_ONCE):
+            part = slice(start, start + AT_ONCE)
+            pixels = self.light.pixels[part]
+            yield part, sphere.pixel_directions(pixels, self.light.width, self.light.height)

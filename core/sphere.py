@@ -68,8 +68,17 @@ def pixel_directions(indices: NDArray[np.intp], width: int, height: int) -> Floa
     sixth of a pixel in the row at a pole, by nothing worth mentioning elsewhere.
     """
     rows, columns = np.divmod(indices, width)
-    v = (rows + 0.5) / height + _centroid_shift(rows, height) / np.pi
-    return to_directions((columns + 0.5) / width, v)
+    if len(rows) <= width + height:
+        v = (rows + 0.5) / height + _centroid_shift(rows, height) / np.pi
+        return to_directions((columns + 0.5) / width, v)
+    # All of a row and all of a column share their sines and cosines.
+    azimuth, polar = centroid_angles(width, height)
+    ring = np.sin(polar)[rows]
+    out = np.empty((len(rows), 3))
+    np.multiply(ring, np.cos(azimuth)[columns], out=out[:, 0])
+    np.multiply(ring, np.sin(azimuth)[columns], out=out[:, 1])
+    out[:, 2] = np.cos(polar)[rows]
+    return out
 
 
 def _centroid_shift(rows: NDArray[np.intp], height: int) -> Floats:
@@ -90,11 +99,11 @@ def pixel_spread(indices: NDArray[np.intp], width: int, height: int) -> Floats:
     centroid's shift about its centroid, and 1 - R is half of it. Without this a light of one
     pixel would have no size. Shape (n,).
     """
-    rows = np.asarray(indices) // width
+    rows = np.arange(height)
     high = np.pi / height
     shift = _centroid_shift(rows, height)
     wide = np.minimum((2 * np.pi / width) * np.sin((rows + 0.5) * high + shift), np.pi)
-    return (wide**2 + high**2) / 24 - shift**2 / 2
+    return ((wide**2 + high**2) / 24 - shift**2 / 2)[np.asarray(indices) // width]
 
 
 def neighbours(

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import sphere
-from ..moments import moments_of
+from ..moments import Moments
 from ..region import RegionLight
 from .placement import Placement
 
@@ -164,4 +164,4 @@ def _placed(light: RegionLight, boxes: list[Box]) -> Placement:
     for number, box in enumerate(boxes):
         box.of(labels)[:] = number
     owner = labels.ravel()[light.pixels].astype(np.intp)
-    return Placement(moments_of(light, owner, len(boxes)).to_light, light, owner)
+    return Placement(Moments(light, owner, len(boxes)).to_light, light, owner)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import sphere
-from ..moments import Moments, moments_of
+from ..moments import Moments
 from ..region import RegionLight
 from .placement import Placement
 
@@ -36,8 +36,8 @@ def kmeans(light: RegionLight, count: int, seed: int = 0) -> Placement:
     cost = np.inf
     for _ in range(ROUNDS):
         placement = Placement(sites, light)
-        moments = moments_of(light, placement.owner, count)
-        before, cost = cost, float(moments.luminous_flux @ moments.shortfall)
+        moments = Moments(light, placement.owner, count)
+        before, cost = cost, _cost(moments)
         empty = np.flatnonzero(moments.luminous_flux == 0)
         if not len(empty) and before - cost <= GAIN * cost:
             break
@@ -45,6 +45,12 @@ def kmeans(light: RegionLight, count: int, seed: int = 0) -> Placement:
         if len(empty):
             sites[empty] = _farthest(light, placement, moments, len(empty))
     return placement
+
+
+def _cost(moments: Moments) -> float:
+    """Sum of flux times half the squared distance from the mean: flux - |sum of vectors|."""
+    length = np.linalg.norm(moments.vector, axis=1)
+    return float(moments.luminous_flux.sum() - length.sum())
 
 
 def _first_sites(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .. import sphere
 from ..cluster import merge
 from ..environment import LUMINANCE_WEIGHTS
-from ..moments import moments_of
+from ..moments import Moments
 from ..region import RegionLight
 from ..settings import ConversionSettings
 from ..strata import Strata
@@ -127,7 +127,7 @@ def _pixels_met(placement: Placement) -> int:
 def _clustered(placement: Placement, count: int, settings: ConversionSettings) -> Placement:
     """Without samples that have no light of their own, as another is nearer to each pixel; those
     that are nearer to one another than a pixel merged, and then down to `count`."""
-    moments = moments_of(placement.light, placement.owner, len(placement.sites))
+    moments = Moments(placement.light, placement.owner, len(placement.sites))
     kept = np.flatnonzero(moments.luminous_flux > 0)
     number = np.zeros(len(placement.sites), np.intp)
     number[kept] = np.arange(len(kept))
@@ -147,7 +147,7 @@ def _suns(
     light: RegionLight, placement: Placement, strata: Strata, settings: ConversionSettings
 ) -> list[Sun]:
     count = len(placement.sites)
-    moments = moments_of(light, placement.owner, count)
+    moments = Moments(light, placement.owner, count)
     brightest = np.zeros(count)
     np.maximum.at(brightest, placement.owner, strata.luminance.ravel()[light.pixels])
     to_light = placement.sites if settings.position == "sample" else moments.to_light

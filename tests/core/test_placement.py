@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sunsplit.core import sphere
-from sunsplit.core.moments import moments_of
+from sunsplit.core.moments import Moments
 from sunsplit.core.placement.placement import method_named
 from sunsplit.core.region import RegionLight, light_of_map
 from tests.maps import direction, paint_disc, sky
@@ -69,7 +69,7 @@ def test_all_light_has_a_site(method, count, pixels):
     assert placement.owner.shape == light.pixels.shape
     assert placement.owner.min() >= 0
     assert placement.owner.max() < len(placement.sites)
-    moments = moments_of(light, placement.owner, len(placement.sites))
+    moments = Moments(light, placement.owner, len(placement.sites))
     assert moments.flux.sum(axis=0) == pytest.approx(light.flux.sum(axis=0), rel=1e-12)
     assert (moments.shortfall >= 0).all()
 
@@ -95,7 +95,7 @@ def test_the_same_light_is_placed_the_same_twice(method):
 def test_two_suns_get_lights_in_proportion(method):
     light = light_of(two_suns(512))
     placement = method_named(method)(light, 64)
-    moments = moments_of(light, placement.owner, len(placement.sites))
+    moments = Moments(light, placement.owner, len(placement.sites))
     near = np.degrees(sphere.angle_between(placement.sites, direction(180, 10))) < 8
     inside = np.degrees(
         sphere.angle_between(
@@ -118,7 +118,7 @@ def test_median_cut_makes_boxes_of_equal_light():
     light = light_of(pixels)
     for count in (2, 16, 64):
         placement = method_named("median-cut")(light, count)
-        part = moments_of(light, placement.owner, count).luminous_flux / light.luminous_flux.sum()
+        part = Moments(light, placement.owner, count).luminous_flux / light.luminous_flux.sum()
         assert part * count == pytest.approx(np.ones(count), rel=0.1 if count == 64 else 0.05)
 
 
@@ -132,7 +132,7 @@ def test_median_cut_follows_its_paper():
         regions = [half for region in regions for half in naive_halves(plane, *region)]
     expected = sorted(float(plane[a:b, c:d].sum()) for a, b, c, d in regions)
     placement = method_named("median-cut")(light, 32)
-    found = np.sort(moments_of(light, placement.owner, 32).luminous_flux)
+    found = np.sort(Moments(light, placement.owner, 32).luminous_flux)
     assert found == pytest.approx(expected, rel=1e-9)
 
 
@@ -153,7 +153,7 @@ def test_variance_finds_the_best_cut(seed):
     pixels = random_map(seed, 16)
     light = light_of(pixels)
     placement = method_named("variance")(light, 2)
-    moments = moments_of(light, placement.owner, 2)
+    moments = Moments(light, placement.owner, 2)
     found = (moments.luminous_flux * (2 - moments.shortfall) * moments.shortfall).max()
     rows, columns = np.divmod(light.pixels, 16)
     directions = sphere.pixel_directions(light.pixels, 16, 8)
@@ -171,7 +171,7 @@ def test_variance_finds_the_best_cut(seed):
 
 
 def cost(light, placement):
-    moments = moments_of(light, placement.owner, len(placement.sites))
+    moments = Moments(light, placement.owner, len(placement.sites))
     return float(moments.luminous_flux @ moments.shortfall)
 
 
