@@ -82,12 +82,12 @@ CHOICES = {
         soft_max=4096,
     ),
     "frequency": EnumProperty(
-        name="Clusters Weigh",
+        name="Frequency",
         description="What weighs samples that lie so close that they are clustered",
         items=[
-            ("energy", "Light", "The light of each sample's cell"),
-            ("mean", "Mean Light", "The light of each sample's cell over the cell's area"),
-            ("one", "Number", "Each sample counts the same"),
+            ("energy", "Energy", "The light of each sample's cell"),
+            ("mean", "Mean", "The light of each sample's cell over the cell's area"),
+            ("one", "One", "Each sample counts the same"),
         ],
         default=DEFAULTS.frequency,
         options=_FRESH,
@@ -130,7 +130,7 @@ CHOICES = {
         options=_FRESH,
     ),
     "residual": EnumProperty(
-        name="Rest",
+        name="Residual",
         description="What becomes of the light that no lamp gives",
         items=[
             ("map", "World Map", "The world shows the map without the lamps' light"),
@@ -141,14 +141,14 @@ CHOICES = {
         options=_FRESH,
     ),
     "residual_width": IntProperty(
-        name="Rest Width",
+        name="Residual Width",
         description="Pixels of the residual map's width, a whole part of the map's; 0: as wide",
         default=0,
         options=_FRESH,
         min=0,
     ),
     "residual_samples": IntProperty(
-        name="Rest Samples",
+        name="Residual Samples",
         description="Cells of the Voronoi map",
         default=DEFAULTS.residual_samples,
         options=_FRESH,

@@ -25,6 +25,8 @@ NO_SUN = "No pixel is much brighter than the rest: the map needs no sun."
 def edge_suns(light: RegionLight, strata: Strata, settings: ConversionSettings) -> ChosenSuns:
     """Suns for the connected groups of region A, cut where a disc would cast wrong shadows."""
     cells, notes = choose_cells(bright_groups(light, strata), strata, settings)
+    if 0 < len(cells) < settings.lights:
+        notes.append(f"{len(cells)} of {settings.lights} lights: more would cast no truer shadows.")
     suns = tuple(_sun(cell, strata, settings) for cell in cells)
     return ChosenSuns(suns, tuple(cells), tuple(notes))
 

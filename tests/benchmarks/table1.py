@@ -98,9 +98,13 @@ class Table:
         """Root of the mean of squared differences, relative to the reference's mean."""
         return float(np.sqrt(max(self.mean(square), 0.0)) / self.mean(self.reference))
 
+    def errors(self, result: Result) -> list[float]:
+        """RMS error of each repeat."""
+        return [self.relative((image - self.reference) ** 2) for image in result.images]
+
     def error(self, result: Result) -> float:
-        """RMS error, the median of the repeats."""
-        return float(np.median([self.relative((i - self.reference) ** 2) for i in result.images]))
+        """Median of the repeats: one firefly must not decide it."""
+        return float(np.median(self.errors(result)))
 
     def bias(self, result: Result) -> float:
         """The part of the RMS error that more samples would not take away; NaN for one repeat.
@@ -115,10 +119,9 @@ class Table:
         return self.relative(pairs / (n * (n - 1)))
 
     def noise(self, result: Result) -> float:
-        """RMS over the repeats; NaN for one repeat."""
-        if len(result.images) < 2:
-            return float("nan")
-        return self.relative(np.var(result.images, axis=0, ddof=1))
+        """What is left of the error without bias and the reference's own noise."""
+        rest = self.error(result) ** 2 - self.bias(result) ** 2 - self.reference_noise() ** 2
+        return float(np.sqrt(np.maximum(rest, 0)))
 
     def reference_noise(self) -> float:
         return self.relative((self.halves[0] - self.halves[1]) ** 2 / 4)
@@ -214,7 +217,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("map", nargs="?", type=Path, default=SAMPLE)
     parser.add_argument("-o", "--output", type=Path, default=Path("out"))
-    parser.add_argument("--size", type=int, default=192, help="pixels (default: %(default)s)")
+    parser.add_argument("--size", type=int, default=160, help="pixels (default: %(default)s)")
     parser.add_argument("--reference", type=int, default=4096, help="samples (default: 4096)")
     parser.add_argument("--repeats", type=int, default=3, help="of each row (default: 3)")
     parser.add_argument("--scale", type=int, default=1, help="divide the rows' samples by this")

@@ -25,6 +25,7 @@ COLUMNS = (
     "bias",
     "noise",
     "mean",
+    "worst",
     "s",
     "conversion s",
     "error / IS 64",
@@ -54,8 +55,9 @@ through the add-on, as a user's would.
   is {noise}.
 - **bias**: the part of the error that no number of samples takes away, from products of
   differences that have no render in common; 0 where these came out negative. IS has none: what
-  its rows show says how well it is known. **noise**: RMS over the seeds.
-- **mean**: of the surfaces, against the reference (all repeats).
+  its rows show says how well it is known. **noise**: the error without bias and the reference's
+  noise. **mean**: of the surfaces, against the reference. **worst**: the largest error of the
+  repeats; where it is far above the median, a firefly was in one of them.
 - **s**: wall seconds of the render call, Cycles' own preparation included; median of
   one run, the rows in turn. Only ratios can be compared with the paper's. **conversion s**:
   once per map.
@@ -114,6 +116,7 @@ def _cells(table: Table, result: Result) -> Iterator[str]:
     yield _number(table.bias(result))
     yield _number(table.noise(result))
     yield f"{table.brightness(result):+.2%}"
+    yield f"{max(table.errors(result)):.4f}"
     yield f"{np.median(result.seconds):.2f}"
     yield f"{result.prepared.seconds:.2f}" if row.settings else ""
     yield f"{table.error(result) / table.error(base):.2f}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from tests.benchmarks import region_a
+from tests.benchmarks import methods, region_a, table1, voronoi
 
 
 def test_region_a(tmp_path, monkeypatch, sunrise):
@@ -18,3 +18,42 @@ def test_region_a(tmp_path, monkeypatch, sunrise):
     # The lower the border, the more light is in the suns.
     assert share["calm 100, NONE"] < share["calm 30, NONE"] < share["calm 10, NONE"]
     assert share["calm 30, as set"] == share["calm 30, 512"]
+
+
+def test_methods(tmp_path, sunrise):
+    runs = methods.main([str(sunrise), "--lights", "2", "20", "-o", str(tmp_path)])
+    assert len(runs) == 2 * 2 * len(methods.METHODS)
+    assert all(one.made == one.asked for one in runs if one.kind == "whole")
+    lines = (tmp_path / "methods.md").read_text().splitlines()
+    assert sum(line.startswith(("| whole", "| composite")) for line in lines) == len(runs)
+
+
+def test_voronoi(tmp_path, monkeypatch):
+    arguments = ["voronoi", "--small", "--rounds", "1", "-o", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", arguments)
+    voronoi.main()
+    lines = (tmp_path / "voronoi.md").read_text().splitlines()
+    assert sum(line.startswith("| ") for line in lines) > 10
+
+
+def test_table1(tmp_path, monkeypatch, sunrise):
+    arguments = ["table1", str(sunrise), "--size", "24", "--reference", "64", "--cells", "60"]
+    arguments += ["--repeats", "1", "--scale", "16", "-o", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", arguments)
+    table1.main()
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "table1-error.png",
+        "table1-renders.png",
+        "table1-time.png",
+        "table1.md",
+    ]
+    lines = (tmp_path / "table1.md").read_text().splitlines()
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if line[:2] == "| "]
+    assert len(rows) == 1 + len(table1.rows()) + 1
+    named = {(row[0], row[2]): row for row in rows[2:]}
+    assert ("D.L.(MC)", "256") in named
+    assert ("IS", "") in named
+    for row in rows[2:]:
+        assert 0 < float(row[5]) < 5
+        # Every row shows the same light, noise and hard shadows aside.
+        assert abs(float(row[8].rstrip("%"))) < 25
