@@ -10,7 +10,7 @@ from ..settings import ConversionSettings
 from ..strata import Strata
 from ..suns import Sun, disc_sun, point_sun
 from .groups import WIDEST_DISC, cut_misfits
-from .placement import ChosenSuns
+from .placement import NO_SUN, ChosenSuns
 
 SMALLEST_SUN = 0.005
 """Part of all light below which the automatic choice makes no sun: nobody would see its shadow."""
@@ -18,8 +18,6 @@ SMALLEST_SUN = 0.005
 WIDEST_OF_A_SHARE = np.radians(10)
 """Angular diameter above which cells of a share that the user has set are cut while lights last:
 a large region wants all the lights that it may have."""
-
-NO_SUN = "No pixel is much brighter than the rest: the map needs no sun."
 
 
 def edge_suns(light: RegionLight, strata: Strata, settings: ConversionSettings) -> ChosenSuns:

@@ -18,6 +18,8 @@ from ..voronoi import label_map, nearest
 DENSE = 1 / 16
 """Part of a map's pixels from which labelling the whole map is faster than asking for each."""
 
+NO_SUN = "No pixel is much brighter than the rest: the map needs no sun."
+
 
 @dataclass(frozen=True, eq=False)
 class Placement:

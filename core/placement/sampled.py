@@ -17,8 +17,7 @@ from ..region import RegionLight
 from ..settings import ConversionSettings
 from ..strata import Strata
 from ..suns import Sun, disc_sun, point_sun
-from .choice import NO_SUN
-from .placement import ChosenSuns, Place, Placement, method_named
+from .placement import NO_SUN, ChosenSuns, Place, Placement, method_named
 
 MOST_SAMPLES = 256
 """At most so many samples are tried for each light."""
