@@ -37,6 +37,12 @@ class SUNSPLIT_OT_convert(bpy.types.Operator):
         self.report({"INFO"}, result.headline)
         return {"FINISHED"}
 
+    def draw(self, context: bpy.types.Context) -> None:
+        from .panel import draw_settings
+
+        self.layout.use_property_split = True
+        draw_settings(self.layout, self)
+
     def _chosen(self, scene_settings: bpy.types.PropertyGroup) -> dict[str, object]:
         """The scene's settings, and before them what was given as an argument."""
         given = {name for name in CHOICES if self.properties.is_property_set(name)}

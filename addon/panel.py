@@ -52,24 +52,37 @@ class SUNSPLIT_PT_settings(bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.prop(settings, "method")
-        layout.prop(settings, "lights")
-        layout.prop(settings, "shape")
-        layout.prop(settings, "share_auto")
-        row = layout.row()
-        row.active = not settings.share_auto
-        row.prop(settings, "share")
-        layout.prop(settings, "strata")
-        if settings.method != "edge":
-            column = layout.column()
-            column.prop(settings, "samples")
-            column.prop(settings, "frequency")
-            column.prop(settings, "position")
-            column.prop(settings, "per_stratum")
-        layout.separator()
-        layout.prop(settings, "residual")
-        if settings.residual == "voronoi":
-            layout.prop(settings, "residual_samples")
-        if settings.residual != "none":
-            layout.prop(settings, "residual_width")
-            layout.prop(settings, "fill")
+        draw_settings(layout, settings)
+
+
+def draw_settings(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    """The choices of a scene or of the operator; what has no effect now is left out or grey."""
+    sampled = settings.method != "edge"
+    layout.prop(settings, "method")
+    layout.prop(settings, "lights")
+    layout.prop(settings, "shape")
+    layout.prop(settings, "share_auto")
+    _row(layout, settings, "share", not settings.share_auto)
+    layout.prop(settings, "fill")
+    _row(layout, settings, "strata", sampled and settings.per_stratum)
+    if sampled:
+        layout.prop(settings, "per_stratum")
+        layout.prop(settings, "samples")
+        layout.prop(settings, "position")
+    if sampled or settings.residual == "voronoi":
+        layout.prop(settings, "frequency")
+    layout.separator()
+    rest = settings.share_auto or settings.share < 1
+    _row(layout, settings, "residual", rest)
+    if settings.residual == "voronoi":
+        _row(layout, settings, "residual_samples", rest)
+    if settings.residual != "none":
+        _row(layout, settings, "residual_width", rest)
+
+
+def _row(
+    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, name: str, active: bool
+) -> None:
+    row = layout.row()
+    row.active = active
+    row.prop(settings, name)

@@ -11,7 +11,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..core.settings import ConversionSettings
+from ..core.settings import MOST, ConversionSettings
 
 DEFAULTS = ConversionSettings()
 
@@ -21,10 +21,11 @@ _FRESH: set[str] = {"SKIP_SAVE"}
 CHOICES = {
     "lights": IntProperty(
         name="Lights",
-        description="At most so many sun lamps; fainter lights stay in the world",
+        description="At most so many sun lamps. Whole lights: fainter ones stay in the world",
         default=DEFAULTS.lights,
         options=_FRESH,
         min=1,
+        max=MOST["lights"],
         soft_max=64,
     ),
     "share_auto": BoolProperty(
@@ -79,6 +80,7 @@ CHOICES = {
         default=0,
         options=_FRESH,
         min=0,
+        max=MOST["samples"],
         soft_max=4096,
     ),
     "frequency": EnumProperty(
@@ -153,6 +155,7 @@ CHOICES = {
         default=DEFAULTS.residual_samples,
         options=_FRESH,
         min=1,
+        max=MOST["residual_samples"],
         soft_max=4096,
     ),
 }

@@ -50,7 +50,6 @@ def settings_for(chosen: Mapping[str, Any]) -> ConversionSettings:
             "share": share,
             # The slider can stop at an odd number; the next even one is meant.
             "strata": values["strata"] + values["strata"] % 2,
-            "residual": "none" if share == 1 else values["residual"],
             "samples": values["samples"] or None,
             "residual_width": values["residual_width"] or None,
             "fill": None if values["fill"] == "auto" else values["fill"],
@@ -122,6 +121,8 @@ def _sentences(conversion: Conversion) -> list[str]:
     if conversion.residual is not None:
         error = conversion.account.relative_error.max()
         lines.append(f"Account: lamps + world = map within {error:.0e}")
+    elif conversion.account.share < 0.999:
+        lines.append(f"{1 - conversion.account.share:.1%} of all light is left out.")
     if conversion.environment.repairs.pixels:
         lines.append(f"Repaired pixels: {conversion.environment.repairs}")
     return [*lines, *conversion.notes]

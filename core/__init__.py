@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .errors import SunsplitError
     from .files.conversion import account_of_files, save
     from .files.maps import load
+    from .files.samples_json import read_samples
     from .settings import ConversionSettings
 
 _HOMES = {
@@ -26,6 +27,7 @@ _HOMES = {
     "account_of_files": "files.conversion",
     "convert": "conversion",
     "load": "files.maps",
+    "read_samples": "files.samples_json",
     "save": "files.conversion",
 }
 
@@ -37,6 +39,7 @@ __all__ = [
     "account_of_files",
     "convert",
     "load",
+    "read_samples",
     "save",
 ]
 

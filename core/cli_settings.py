@@ -20,7 +20,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
 
 
 def settings_from(options: argparse.Namespace) -> ConversionSettings:
-    """What was chosen; a share of 1 leaves no rest."""
+    """What was chosen."""
     return ConversionSettings(
         lights=options.lights,
         share=options.share,
@@ -31,7 +31,7 @@ def settings_from(options: argparse.Namespace) -> ConversionSettings:
         shape=options.shape,
         position=options.position,
         frequency=options.frequency,
-        residual=options.residual if options.share != 1 else "none",
+        residual=options.residual,
         residual_width=options.residual_width,
         residual_samples=options.residual_samples,
         fill=options.fill,

@@ -8,6 +8,7 @@ for each frequency F. Each merge looks at all clusters once or twice: N^2 in all
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +33,9 @@ FREE = -1.0
 NEIGHBOURS = 8
 """How many neighbours of each sample a k-d tree finds to begin with."""
 
+Narrowed = Callable[[Floats], Floats]
+"""From unit vectors (..., 3) to parts, 0 to 1, (...)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Clusters:
@@ -52,6 +56,7 @@ def merge(
     frequency: Frequency,
     nearer_than: float,
     down_to: int | None = None,
+    narrowed: Narrowed | None = None,
 ) -> Clusters:
     """Merge all pairs nearer than an angle in radians, then go on until `down_to` are left.
 
@@ -59,6 +64,7 @@ def merge(
     cell, (n,), which only "mean" uses. Cheapest first, in both stages; of pairs that cost nothing
     the nearest first; of equals those of the least coordinates, so that the order of the samples
     does not matter. More than `down_to` are left where all are more than 90 degrees apart.
+    narrowed: what part of `nearer_than` counts at a place; of two places the smaller.
     """
     if not (np.isfinite(energy).all() and np.all(energy >= 0)):
         raise ValueError("energy must be finite and not negative")
@@ -66,7 +72,7 @@ def merge(
     amount = np.ones(len(sites)) if frequency == "one" else energy[order].astype(np.float64)
     size = area[order].astype(np.float64) if frequency == "mean" else np.ones(len(sites))
     work = _Merging(sites[order], amount, size, frequency == "mean")
-    work.run(min(nearer_than, WIDEST), 1)
+    work.run(min(nearer_than, WIDEST), 1, narrowed)
     if down_to is not None:
         work.run(WIDEST, down_to)
     owner = np.empty(len(sites), np.intp)
@@ -88,6 +94,7 @@ class _Merging:
     def __init__(self, sites: Floats, amount: Floats, size: Floats, size_adds: bool) -> None:
         count = len(sites)
         self.count, self.size, self.size_adds, self.reach = count, size, size_adds, 0.0
+        self.narrowed: Narrowed | None = None
         self.at = np.ascontiguousarray(sites.T, dtype=np.float64)
         largest = np.divide(amount, size, out=np.zeros(count), where=size > 0).max(initial=0)
         # A power of two, so that nothing is rounded.
@@ -114,8 +121,9 @@ class _Merging:
         self.pack()
         return self.all_centres[owner]
 
-    def run(self, reach: float, down_to: int) -> None:
+    def run(self, reach: float, down_to: int, narrowed: Narrowed | None = None) -> None:
         """Merge pairs nearer than an angle until so many clusters are left, or no such pair."""
+        self.narrowed = narrowed
         if reach <= 0 or self.count <= max(down_to, 1):
             return
         self.pack()
@@ -161,7 +169,11 @@ class _Merging:
         if not cost.all():
             with np.errstate(divide="ignore"):
                 cost = np.where(cost > 0, cost, -1 / angle)
-        return np.where(angle < self.reach, cost, NOBODY)
+        reach = self.reach
+        if self.narrowed:
+            at = (self.narrowed(self.at[:, i].T), self.narrowed(self.at[:, j].T))
+            reach = self.reach * np.minimum(*at)
+        return np.where(angle < reach, cost, NOBODY)
 
     def point(self, i: Indices | int, key: Floats | float, partner: Indices | int) -> None:
         """Set keys; -1 for a partner that is not known."""

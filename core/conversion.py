@@ -54,13 +54,23 @@ def convert(
     choose_suns = edge_suns if settings.method == "edge" else sampled_suns
     chosen = choose_suns(light, strata, settings)
     progress("residual", 0.7)
-    residual, samples, notes = None, None, chosen.notes
-    if settings.residual != "none":
+    residual, samples, notes = None, None, (*_share_note(strata, settings), *chosen.notes)
+    if settings.leaves_residual:
         residual = reduced(without(environment, chosen.replaced), settings.residual_width)
-    if settings.residual == "voronoi":
-        samples, more = map_of_samples(residual, settings)
-        residual, notes = samples.radiance, notes + more
+        if settings.residual == "voronoi":
+            samples, more = map_of_samples(residual, settings)
+            residual, notes = samples.radiance, notes + more
     progress("account", 0.9)
     account = settle(environment.radiance, chosen.suns, residual)
     progress("done", 1.0)
     return Conversion(environment, settings, strata, chosen.suns, residual, samples, account, notes)
+
+
+def _share_note(strata: Strata, settings: ConversionSettings) -> tuple[str, ...]:
+    asked = settings.share
+    if asked is None or abs(strata.share - asked) <= min(0.02, asked / 2):
+        return ()
+    return (
+        f"A share of {asked:.2%} was asked for; pixels of equal brightness stay together, so "
+        f"region A holds {strata.share:.1%}.",
+    )

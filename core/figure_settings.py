@@ -31,7 +31,7 @@ class FigureSettings:
         for name in ("samples", "even_samples"):
             if getattr(self, name) < 1:
                 raise BadSetting(f"{name} must be at least 1, not {getattr(self, name)}.")
-        self.of_conversion  # noqa: B018 - it checks the others
+        _ = self.of_conversion, self.of_map  # making them checks the others
 
     @property
     def of_map(self) -> ConversionSettings:

@@ -41,7 +41,7 @@ def map_of_samples(
     light = light_of_map(radiance)
     light = light.part(light.luminous_flux > 0)
     if not len(light.pixels):
-        return _no_samples(radiance), ("The rest holds no light: its Voronoi map is black.",)
+        return no_samples(radiance), ("The rest holds no light: its Voronoi map is black.",)
     count = settings.residual_samples
     sites = sample(light, count, settings).sites
     labels = label_map(sites, width, height)
@@ -59,5 +59,6 @@ def map_of_samples(
     return MapOfSamples(sites, sums.flux, sums.area, voronoi_map(sums.mean_radiance, labels)), notes
 
 
-def _no_samples(radiance: NDArray[np.float32]) -> MapOfSamples:
+def no_samples(radiance: NDArray[np.float32]) -> MapOfSamples:
+    """Of a black map."""
     return MapOfSamples(np.empty((0, 3)), np.empty((0, 3)), np.empty(0), np.zeros_like(radiance))

@@ -15,6 +15,9 @@ Frequency = Literal["one", "energy", "mean"]
 ResidualKind = Literal["map", "voronoi", "none"]
 Fill = Literal["surroundings", "black"]
 
+MOST = {"lights": 10_000, "samples": 50_000, "residual_samples": 20_000}
+"""The largest numbers, for which every method is done in a minute or so on a map 1024 wide."""
+
 
 class BadSetting(SunsplitError):
     """A setting outside its limits."""
@@ -61,10 +64,10 @@ class ConversionSettings:
     fill: Fill | None = None
 
     def __post_init__(self) -> None:
-        for name, least in (("lights", 1), ("samples", 1), ("residual_samples", 1)):
+        for name, most in MOST.items():
             value = getattr(self, name)
-            if value is not None and value < least:
-                raise BadSetting(f"{name} must be at least {least}, not {value}.")
+            if value is not None and not 1 <= value <= most:
+                raise BadSetting(f"{name} must be 1 to {most:,}, not {value:,}.")
         if self.share is not None and not 0 <= self.share <= 1:
             raise BadSetting(f"share must be 0 to 1, not {self.share:g}.")
         if self.strata < 2 or self.strata % 2:
@@ -75,6 +78,11 @@ class ConversionSettings:
             if (value := getattr(self, name)) not in choice:
                 options = " or ".join(f'"{option}"' for option in choice if option)
                 raise BadSetting(f'{name} must be {options}, not "{value}".')
+
+    @property
+    def leaves_residual(self) -> bool:
+        """Whether there is a rest to show: not if all light goes to suns."""
+        return self.residual != "none" and self.share != 1
 
     @property
     def filled(self) -> Fill:

@@ -54,6 +54,14 @@ def pixels_at(directions: ArrayLike, width: int, height: int) -> NDArray[np.intp
     return np.minimum((v * height).astype(np.intp), height - 1) * width + column
 
 
+def pixel_narrowing(directions: ArrayLike) -> Floats:
+    """How wide a pixel is there against its height, 1 on the horizon, 0 at a pole.
+
+    directions: unit vectors (..., 3). Returns (...).
+    """
+    return np.hypot(*np.moveaxis(np.asarray(directions, np.float64)[..., :2], -1, 0))
+
+
 def centroid_angles(width: int, height: int) -> tuple[Floats, Floats]:
     """Azimuth of each column, (width,), and polar angle of each row's centroid, (height,)."""
     rows = np.arange(height)

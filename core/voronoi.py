@@ -8,11 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
-from .tiles import owners
 from .tolerances import TIE
+from .voronoi_search import owners
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
+
+CROWDED = 64
+"""Pixels for each site, on average, below which asking for each pixel is faster than tiles are:
+where sites crowd, a tile has more of them than it has pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +86,9 @@ def label_map(sites: Floats, width: int, height: int) -> NDArray[np.int32]:
     is no site.
     """
     distinct, index = _distinct(sites)
+    if len(distinct) * CROWDED > width * height:
+        pixels = sphere.pixel_centres(np.arange(width * height), width, height)
+        return nearest(pixels, sites).astype(np.int32).reshape(height, width)
     labels = owners(distinct, width, height)
     return labels if len(distinct) == len(sites) else index.astype(np.int32)[labels]
 

@@ -70,6 +70,7 @@ def describe(conversion: Conversion) -> dict[str, Any]:
         "share": conversion.strata.share,
         "threshold": conversion.strata.threshold,
         "fill": conversion.settings.filled,
+        "residual": conversion.settings.residual if conversion.residual is not None else "none",
     }
     return {
         "source": {

@@ -16,7 +16,7 @@ from ..figure_settings import FigureSettings
 from ..placement.placement import method_named
 from ..progress import Progress, silent
 from ..region import RegionLight, light_of_map
-from ..samples import MapOfSamples, map_of_samples
+from ..samples import MapOfSamples, map_of_samples, no_samples
 from ..settings import Method
 from ..strata import Strata
 from ..voronoi import label_map
@@ -180,7 +180,8 @@ def _draw_samples(looks: _Looks, samples: MapOfSamples, settings: FigureSettings
 
 def _draw_regions(looks: _Looks, split: Conversion, settings: FigureSettings) -> Image.Image:
     """Figure 3: the map cut in two by luminance, and what becomes of either part."""
-    strata, rest = split.strata, split.samples
+    strata = split.strata
+    rest = split.samples or no_samples(split.environment.radiance)
     light, area = (part[strata.count // 2 :].sum() for part in parts_of_strata(strata))
     suns = np.array([sun.to_light for sun in split.suns]).reshape(-1, 3)
     lights = _left(len(suns), settings.lights, "lights")
@@ -257,9 +258,10 @@ def _tone(stratum: int, count: int) -> Colour:
 
 
 def _left(count: int, wanted: int, things: str) -> str:
-    """How many there are, and why."""
-    number = f"{count}" if count == wanted else f"{count} of {wanted}"
-    return f"{number} {things}, clustered where nearer than a pixel"
+    """How many there are of those that were wanted."""
+    if count == wanted:
+        return f"{count} {things}"
+    return f"{count} of {wanted} {things}: there is no room for more a pixel apart"
 
 
 def _percent(part: float) -> str:

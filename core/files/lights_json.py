@@ -44,18 +44,7 @@ def write(path: Path, document: dict[str, Any]) -> None:
 
 def read(path: Path) -> tuple[dict[str, Any], tuple[Sun, ...], Account]:
     """The whole document, its suns and its account. Raises UnusableInput."""
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise UnusableInput(f"{path} does not exist.") from None
-    except (OSError, ValueError) as error:
-        raise UnusableInput(f"{path.name} is not readable JSON ({error}).") from error
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise UnusableInput(f"{path.name} was not written by Sunsplit: its format is missing.")
-    if document.get("version") != VERSION:
-        raise UnusableInput(
-            f"{path.name} has version {document.get('version')}; this Sunsplit reads {VERSION}."
-        )
+    document = read_document(path, FORMAT, VERSION)
     try:
         suns = tuple(_sun(entry) for entry in document["suns"])
         account = Account(*(np.array(document["account"][k]) for k in _ACCOUNT_PARTS))
@@ -63,6 +52,25 @@ def read(path: Path) -> tuple[dict[str, Any], tuple[Sun, ...], Account]:
     except (KeyError, TypeError, ValueError) as error:
         raise UnusableInput(f"{path.name} is damaged: {error!r} in its suns or account.") from error
     return document, suns, account
+
+
+def read_document(path: Path, file_format: str, version: int) -> dict[str, Any]:
+    """A JSON file of ours, of one format and version. Raises UnusableInput."""
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise UnusableInput(f"{path} does not exist.") from None
+    except (OSError, ValueError) as error:
+        raise UnusableInput(f"{path.name} is not readable JSON ({error}).") from error
+    if not isinstance(document, dict) or document.get("format") != file_format:
+        raise UnusableInput(
+            f"{path.name} was not written by Sunsplit as {file_format}: its format is missing."
+        )
+    if document.get("version") != version:
+        raise UnusableInput(
+            f"{path.name} has version {document.get('version')}; this Sunsplit reads {version}."
+        )
+    return document
 
 
 _ACCOUNT_PARTS = ("source", "suns", "residual")

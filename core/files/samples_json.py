@@ -6,12 +6,13 @@ import json
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import sphere
 from ..errors import UnusableInput
 from ..samples import MapOfSamples
 from . import exr
-from .lights_json import AXES
+from .lights_json import AXES, read_document
 
 FORMAT = "sunsplit.samples"
 VERSION = 1
@@ -40,29 +41,27 @@ def write(path: Path, samples: MapOfSamples, map_name: str) -> None:
     path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
 
-def read(path: str | Path) -> MapOfSamples:
+def read_samples(path: str | Path) -> MapOfSamples:
     """Samples and their map, as they were written. Raises UnusableInput."""
     path = Path(path)
+    document = read_document(path, FORMAT, VERSION)
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise UnusableInput(f"{path} does not exist.") from None
-    except (OSError, ValueError) as error:
-        raise UnusableInput(f"{path.name} is not readable JSON ({error}).") from error
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise UnusableInput(f"{path.name} is no list of samples: its format is missing.")
-    if document.get("version") != VERSION:
-        raise UnusableInput(
-            f"{path.name} has version {document.get('version')}; this Sunsplit reads {VERSION}."
-        )
-    try:
-        samples, name = document["samples"], document["map"]["file"]
-        sites = np.array([entry["to_light"] for entry in samples], float).reshape(-1, 3)
-        flux = np.array([entry["scalar_irradiance"] for entry in samples], float).reshape(-1, 3)
-        area = np.array([entry["area"] for entry in samples], float)
+        samples = document["samples"]
+        sites = _numbers(samples, "to_light").reshape(len(samples), 3)
+        flux = _numbers(samples, "scalar_irradiance").reshape(len(samples), 3)
+        area = _numbers(samples, "area").reshape(len(samples))
+        # Beside the list, whatever folders its name may hold.
+        image = path.parent / Path(document["map"]["file"]).name
+        shape = int(document["map"]["height"]), int(document["map"]["width"]), 3
     except (KeyError, TypeError, ValueError) as error:
         raise UnusableInput(f"{path.name} is damaged: {error!r}.") from error
-    if not (path.parent / name).exists():
-        raise UnusableInput(f"{path.parent / name} is missing: convert the map again.")
-    radiance = exr.read(path.parent / name)[0].astype(np.float32)
+    if not image.exists():
+        raise UnusableInput(f"{image} is missing: convert the map again.")
+    radiance = exr.read(image)[0].astype(np.float32)
+    if radiance.shape != shape:
+        raise UnusableInput(f"{image.name} is another map than {path.name} says.")
     return MapOfSamples(sites, flux, area, radiance)
+
+
+def _numbers(samples: list[dict[str, object]], name: str) -> NDArray[np.float64]:
+    return np.array([entry[name] for entry in samples], dtype=np.float64)

@@ -9,8 +9,8 @@ from ..region import RegionLight, bright_groups
 from ..settings import ConversionSettings
 from ..strata import Strata
 from ..suns import Sun, disc_sun, point_sun
-from .groups import WIDEST_DISC, cut_misfits
-from .placement import NO_SUN, ChosenSuns
+from .groups import cut_misfits
+from .placement import NO_SUN, WIDEST_DISC, ChosenSuns, widest_note
 
 SMALLEST_SUN = 0.005
 """Part of all light below which the automatic choice makes no sun: nobody would see its shadow."""
@@ -25,7 +25,11 @@ def edge_suns(light: RegionLight, strata: Strata, settings: ConversionSettings) 
     cells, notes = choose_cells(bright_groups(light, strata), strata, settings)
     if 0 < len(cells) < settings.lights:
         notes.append(f"{len(cells)} of {settings.lights} lights: more would cast no truer shadows.")
+    if settings.samples or settings.per_stratum or settings.position == "sample":
+        notes.append("Samples, per stratum and position are of the other methods: edge has none.")
     suns = tuple(_sun(cell, strata, settings) for cell in cells)
+    if settings.share is not None:  # by itself it takes no light into a lamp that is too wide
+        notes += widest_note(suns)
     return ChosenSuns(suns, tuple(cells), tuple(notes))
 
 
@@ -62,24 +66,10 @@ def _cells_of_a_share(
     groups: list[Cell], all_light: float, strata: Strata, settings: ConversionSettings
 ) -> tuple[list[Cell], list[str]]:
     """Cells where the user has set the share: wide ones stay, but are cut as far as lights go."""
-    notes = []
-    if abs(strata.share - settings.share) > 0.02:
-        notes.append(
-            f"A share of {settings.share:.0%} was asked for; pixels of equal brightness stay "
-            f"together, so region A holds {strata.share:.1%}."
-        )
     cells, without_light = cut_misfits(
         groups, settings.lights, all_light, widest=WIDEST_OF_A_SHARE, keep_all=settings.share == 1
     )
-    notes += _left_out(without_light, _limit(settings), all_light)
-    wide = [cell for cell in cells if cell.angular_diameter > WIDEST_DISC]
-    if wide:
-        widest = np.degrees(max(cell.angular_diameter for cell in wide))
-        notes.append(
-            f"The widest sun spans {widest:.0f}° and stands for its light only roughly: "
-            "more lights or a smaller share would be truer."
-        )
-    return cells, notes
+    return cells, _left_out(without_light, _limit(settings), all_light)
 
 
 def _limit(settings: ConversionSettings) -> str:

@@ -8,6 +8,7 @@ from math import hypot
 import numpy as np
 
 from ..cells import Cell, split
+from .placement import WIDEST_DISC
 
 ALLOWED_MISFIT = 0.002
 """Predicted shadow-edge error, as a part of all light, up to which a disc may stand for a group."""
@@ -18,9 +19,6 @@ GAIN_OF_A_CUT = 0.75
 On 15 maps, cutting a sun with its halo in two gives 0.9 to 1.1 (it only makes two bad half discs),
 a round soft box 1.6; tubes, windows and clusters of lamps give 0.3 to 0.6.
 """
-
-WIDEST_DISC = np.radians(45)
-"""Wider cells are cut whatever it brings: a lamp of 74 degrees made a picture 29 % wrong."""
 
 
 def cut_misfits(

@@ -21,6 +21,9 @@ GAIN = 1e-3
 DRAWS = 20
 """Pixels drawn in proportion to their light for each site to start with."""
 
+CAREFUL = 2000
+"""Sites up to which k-means++ chooses among the draws; its time grows with the square."""
+
 
 def kmeans(light: RegionLight, count: int, seed: int = 0) -> Placement:
     """Sites in the mean of their cells' light, of small sum of flux times squared distance.
@@ -59,7 +62,9 @@ def _first_sites(
     """k-means++ (Arthur and Vassilvitskii 2007) on a sample of the pixels."""
     chance = light.luminous_flux[lit] / light.luminous_flux[lit].max()
     steps = np.cumsum(chance)
-    drawn = np.searchsorted(steps, random.random(max(DRAWS * count, 2000)) * steps[-1])
+    drawn = np.searchsorted(
+        steps, random.random(max(DRAWS * min(count, CAREFUL), 3 * count)) * steps[-1]
+    )
     # A light that is drawn ever again counts as often, and the faintest pixels count too.
     chosen, weight = np.unique(np.minimum(drawn, len(lit) - 1), return_counts=True)
     if len(chosen) < count:
@@ -67,6 +72,8 @@ def _first_sites(
         more = rest[np.argsort(-chance[rest], kind="stable")][: count - len(chosen)]
         chosen, weight = np.append(chosen, more), np.append(weight, np.ones(len(more)))
     directions = sphere.pixel_directions(light.pixels[lit[chosen]], light.width, light.height)
+    if count > CAREFUL:
+        return directions[random.choice(len(chosen), count, False, weight / weight.sum())]
     picked = np.empty(count, np.intp)
     apart = np.full(len(chosen), 4.0)
     for number in range(count):

@@ -14,8 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import sphere
+from ..region import RegionLight
 from .penrose_table import CORRECTIONS
 from .penrose_tiles import DEEPEST, DENSITY, FIBONACCI, PHI, UNIT, Tiles, subdivide
+from .placement import Placement
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -34,6 +37,12 @@ _BORDERS = np.array(
     ]
 )
 """Importance at which each phase of each level begins; level n begins near F(2n)."""
+
+
+def penrose(light: RegionLight, count: int) -> Placement:
+    """Samples as dense on the map as its light, pixels weighted by their area on the sphere."""
+    x, y = penrose_points(light.plane(), count).T
+    return Placement(sphere.to_directions(x / light.width, y / light.height), light)
 
 
 def penrose_points(importance: Floats, count: int) -> Floats:

@@ -17,7 +17,7 @@ from ..region import RegionLight
 from ..settings import ConversionSettings
 from ..strata import Strata
 from ..suns import Sun, disc_sun, point_sun
-from .placement import NO_SUN, ChosenSuns, Place, Placement, method_named
+from .placement import NO_SUN, ChosenSuns, Place, Placement, method_named, widest_note
 
 MOST_SAMPLES = 256
 """At most so many samples are tried for each light."""
@@ -26,18 +26,18 @@ LIMIT_OF_SAMPLES = 200_000
 """And so many in all: placing them takes some seconds."""
 
 A_PIXEL = 0.99
-"""Distance, in heights of a pixel, below which samples are clustered: just less than one, so that
-pixels one above the other stay two. Near the poles those side by side do not."""
+"""Distance, in pixels as wide as they are there, below which samples are clustered: just less than
+one, so that the means of two whole pixels stay two."""
 
-ROUNDS = 5
-"""How often more samples are tried: some that have pixels of their own are clustered still."""
+FEW_PIXELS = 5000
+"""Pixels up to which a sample in each of them is clustered: in about a second."""
 
 
 def sampled_suns(light: RegionLight, strata: Strata, settings: ConversionSettings) -> ChosenSuns:
     """At most `settings.lights` suns that hold all of the light."""
     light = light.part(light.luminous_flux > 0)
     if not len(light.pixels):
-        return ChosenSuns((), (), () if settings.share == 0 else (NO_SUN,))
+        return ChosenSuns((), (), (NO_SUN,) if settings.share is None else ())
     parts, notes = [light], []
     if settings.per_stratum:
         parts = _by_stratum(light, strata)
@@ -51,6 +51,7 @@ def sampled_suns(light: RegionLight, strata: Strata, settings: ConversionSetting
     suns.sort(key=lambda sun: -float(sun.scalar_irradiance @ LUMINANCE_WEIGHTS))
     if len(suns) < settings.lights:
         notes.append(_fewer(len(suns), light, settings))
+    notes += widest_note(suns)
     return ChosenSuns(tuple(suns), (light,), tuple(notes))
 
 
@@ -82,16 +83,23 @@ def sample(
 def _as_many(
     light: RegionLight, place: Place, count: int, settings: ConversionSettings
 ) -> Placement:
-    """`count` samples after clustering, where the map has room for them."""
-    wanted = count
-    for _ in range(ROUNDS):
+    """`count` samples after clustering, or as many as the region has room for."""
+    wanted, most = count, None
+    while True:
         placement = _enough(light, place, wanted)
         clustered = _clustered(placement, count, settings)
-        missing = count - len(clustered.sites)
-        if missing <= 0 or _pixels_met(placement) < wanted:
+        if most is None or len(clustered.sites) > len(most.sites):
+            most = clustered
+        if len(most.sites) >= count:
+            return most
+        if _pixels_met(placement) < wanted:
             break
-        wanted += missing
-    return clustered
+        wanted = max(wanted + count - len(most.sites), wanted * 5 // 4)
+    if len(light.pixels) > max(FEW_PIXELS, 2 * count):
+        return most
+    # So much of the light in one place that no number of samples meets the rest of the pixels.
+    each = _clustered(_each_pixel(light), count, settings)
+    return max(most, each, key=lambda one: len(one.sites))
 
 
 def _enough(light: RegionLight, place: Place, count: int) -> Placement:
@@ -100,8 +108,8 @@ def _enough(light: RegionLight, place: Place, count: int) -> Placement:
     A peak draws many samples into one pixel (paper, section 3), and more go elsewhere only with
     a larger number of them all.
     """
-    if len(light.pixels) <= count:  # one for each pixel
-        return Placement(sphere.pixel_directions(light.pixels, light.width, light.height), light)
+    if len(light.pixels) <= count:  # and there are no more to meet
+        return _each_pixel(light)
     placement = place(light, count)
     low = high = count
     while _pixels_met(placement) < count and high < min(count * MOST_SAMPLES, LIMIT_OF_SAMPLES):
@@ -115,6 +123,11 @@ def _enough(light: RegionLight, place: Place, count: int) -> Placement:
         else:
             high, placement = middle, fewer
     return placement
+
+
+def _each_pixel(light: RegionLight) -> Placement:
+    """A sample in each pixel."""
+    return Placement(sphere.pixel_directions(light.pixels, light.width, light.height), light)
 
 
 def _pixels_met(placement: Placement) -> int:
@@ -137,6 +150,7 @@ def _clustered(placement: Placement, count: int, settings: ConversionSettings) -
         settings.frequency,
         nearer_than=A_PIXEL * np.pi / placement.light.height,
         down_to=count,
+        narrowed=sphere.pixel_narrowing,
     )
     owner = clusters.label[number[placement.owner]]
     return Placement(clusters.centres, placement.light, owner)
@@ -169,20 +183,23 @@ def _by_stratum(light: RegionLight, strata: Strata) -> list[RegionLight]:
 
 
 def _shared_out(parts: list[RegionLight], lights: int) -> NDArray[np.intp]:
-    """Lights in proportion to each part's light, one at least."""
+    """Lights in proportion to each part's light; one at least, but no more than it has pixels."""
     weight = np.array([part.luminous_flux.sum() for part in parts])
-    wanted = weight / weight.sum() * (lights - len(parts))
-    shares = np.floor(wanted).astype(np.intp)
-    largest = np.argsort(shares - wanted, kind="stable")[: lights - len(parts) - shares.sum()]
-    shares[largest] += 1
-    return shares + 1
+    room = np.array([len(part.pixels) for part in parts])
+    shares = np.ones(len(parts), np.intp)
+    for _ in range(min(lights, room.sum()) - len(parts)):
+        # The next light to where each of those there has the most to give (D'Hondt).
+        shares[np.argmax(np.where(shares < room, weight / (shares + 1), -1))] += 1
+    return shares
 
 
 def _fewer(count: int, light: RegionLight, settings: ConversionSettings) -> str:
-    if settings.samples and settings.samples < settings.lights:
+    pixels = len(light.pixels)
+    if pixels <= settings.lights:
+        shine = "1 pixel that shines" if pixels == 1 else f"{pixels} pixels that shine"
+        why = f"region A has only {shine}"
+    elif settings.samples and settings.samples < settings.lights:
         why = f"{settings.samples} samples were placed"
-    elif len(light.pixels) <= settings.lights:
-        why = f"region A has only {len(light.pixels)} pixels that shine"
     else:
         why = "samples nearer than a pixel were clustered"
     return f"{count} of {settings.lights} lights: {why}."

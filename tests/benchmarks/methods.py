@@ -61,7 +61,8 @@ def run(found: EnvironmentMap, kind: str, method: str, lights: int) -> Run:
     ]
     error = float(conversion.account.relative_error.max())
     where = f"{found.name}, {kind}, {method}, {lights} lights"
-    if made > lights or (made < lights and not reason):
+    stated = f"{made} of {lights} lights" in reason
+    if made > lights or (made < lights and not stated):
         raise AssertionError(f"{where}: {made} lights without a reason")
     if not np.isfinite(numbers).all():
         raise AssertionError(f"{where}: a sun is not finite")

@@ -24,6 +24,7 @@ import numpy as np
 from tqdm import tqdm
 
 from sunsplit.core.settings import ConversionSettings
+from tests.benchmarks import table1_plots, table1_report
 from tests.benchmarks.table1_scene import figurine_scene, key_azimuth, surfaces, timed_render
 
 SAMPLE = Path(__file__).parents[2] / "sample_scenes" / "spruit_sunrise_1k.hdr"
@@ -226,8 +227,6 @@ def main() -> None:
     options.output.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="sunsplit-") as folder:
         table = measure(options.map.resolve(), options, Path(folder))
-    from tests.benchmarks import table1_plots, table1_report
-
     report = table1_report.write(table)
     table1_plots.draw(table)
     print(report)

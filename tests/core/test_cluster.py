@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sunsplit.core import sphere
 from sunsplit.core.cluster import Clusters, merge
 from sunsplit.core.sphere import angle_between
 from tests.maps import direction
@@ -217,3 +218,32 @@ def test_twenty_thousand_samples():
     found = merge(sites, energy, area, "energy", 2 * np.pi / 1024)
     assert 14_000 < len(found.centres) < 16_000
     assert len(np.unique(found.label)) == len(found.centres)
+
+
+def test_a_reach_that_narrows_towards_the_poles():
+    """Against all pairs, each of which counts where it is near at both its places."""
+    random = np.random.default_rng(1)
+    sites = random.normal(size=(40, 3))
+    sites /= np.linalg.norm(sites, axis=1)[:, None]
+    energy = random.random(40) ** 3
+    found = merge(sites, energy, np.ones(40), "energy", 0.6, narrowed=sphere.pixel_narrowing)
+    centres, weight, members = [*sites], [*energy], [[i] for i in range(40)]
+    while True:
+        costs = {
+            (i, j): weight[i] * weight[j] / (weight[i] + weight[j]) * angle**2
+            for i in range(len(centres))
+            for j in range(i + 1, len(centres))
+            if (angle := float(sphere.angle_between(centres[i], centres[j])))
+            < 0.6 * min(np.hypot(*centres[i][:2]), np.hypot(*centres[j][:2]))
+        }
+        if not costs:
+            break
+        i, j = min(costs, key=costs.get)
+        mean = weight[i] * centres[i] + weight[j] * centres[j]
+        centres[i] = mean / np.linalg.norm(mean)
+        weight[i] += weight[j]
+        members[i] += members[j]
+        del centres[j], weight[j], members[j]
+    parts = [np.flatnonzero(found.label == k).tolist() for k in range(len(found.centres))]
+    assert sorted(parts) == sorted(sorted(one) for one in members)
+    assert 10 < len(parts) < 35
