@@ -24,11 +24,13 @@ from .cli_settings import (
 )
 from .errors import SunsplitError
 from .progress import Progress, terminal_progress
+from .settings import BadSetting
 
 if TYPE_CHECKING:  # imported where they are used: `--help` must not wait for scipy
     from .conversion import Conversion
     from .files.conversion import WrittenFiles
 
+WRONG_USAGE = 2
 CANCELLED = 130
 
 
@@ -42,6 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if sys.stdout:
             sys.stdout.flush()
         return status
+    except BadSetting as error:
+        return _fail(str(error), WRONG_USAGE)
     except SunsplitError as error:
         return _fail(str(error))
     except BrokenPipeError:

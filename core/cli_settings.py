@@ -62,7 +62,7 @@ def add_figure_settings(parser: argparse.ArgumentParser) -> None:
         type=_strata,
         default=FIGURES.strata,
         metavar="N",
-        help="strata of luminance (default: %(default)s)",
+        help="strata of luminance; half of them are region A (default: %(default)s)",
     )
     group.add_argument(
         "--method",
@@ -96,7 +96,7 @@ def _add_bright(group: argparse._ArgumentGroup) -> None:
         type=_strata,
         default=DEFAULTS.strata,
         metavar="N",
-        help="strata of luminance (default: %(default)s)",
+        help="strata of luminance; half of them are region A (default: %(default)s)",
     )
     group.add_argument(
         "--fill",
@@ -136,7 +136,10 @@ def _add_placement(group: argparse._ArgumentGroup) -> None:
         "--per-stratum", action="store_true", help="place lights in each bright stratum by itself"
     )
     group.add_argument(
-        "--shape", choices=get_args(Shape), default=DEFAULTS.shape, help="(default: %(default)s)"
+        "--shape",
+        choices=get_args(Shape),
+        default=DEFAULTS.shape,
+        help="disc: as wide as the light that it replaces (default); point: of no width",
     )
     group.add_argument(
         "--position",

@@ -171,6 +171,16 @@ def test_the_papers_settings_arrive(sky_file, out, capfd):
     assert all(sun["angular_diameter"] == 0 for sun in answer["suns"])
 
 
+@pytest.mark.parametrize("option", [("--samples", "999999"), ("--residual-width", "1")])
+def test_a_number_outside_its_limits_is_wrong_usage(sky_file, out, capfd, option):
+    assert run("convert", sky_file, "-o", out, *option) == 2
+    said, complaints = capfd.readouterr()
+    assert said == ""
+    assert complaints.count("\n") == 1
+    assert "must be" in complaints
+    assert names(out) == []
+
+
 def test_repairs_and_warnings_are_said(tmp_path, out, capfd):
     pixels = sunny()
     pixels[3, 4] = np.nan
