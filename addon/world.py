@@ -146,7 +146,7 @@ def converted_world(
         # Between cells nothing is to be blended: a Voronoi map has edges.
         closest = conversion.settings.residual == "voronoi"
         _insert_residual(tree, texture, image, "Closest" if closest else texture.interpolation)
-        _set_sampling(new, residual)
+        _set_sampling(new, residual, closest)
     except BaseException:  # whatever it is, it goes on; only the half-made copy goes away
         remove_converted(new)
         raise
@@ -214,11 +214,13 @@ def _texture_like(
     return rest
 
 
-def _set_sampling(world: bpy.types.World, residual: NDArray[np.float32] | None) -> None:
+def _set_sampling(
+    world: bpy.types.World, residual: NDArray[np.float32] | None, cells: bool
+) -> None:
     """Cycles' world importance sampling; nothing to do where Cycles is switched off."""
     if not hasattr(world, "cycles"):
         return
-    sampling = choose_sampling(residual)
+    sampling = choose_sampling(residual, cells)
     world.cycles.sampling_method = sampling.method
     if sampling.method == "MANUAL":
         world.cycles.sample_map_resolution = sampling.resolution

@@ -22,6 +22,9 @@ CALM_PEAK = 1000.0
 SMALL_TABLE = 512
 """Width of the sampling table for a residual that is calm, but not calm enough to do without."""
 
+WIDEST_TABLE = 8192
+"""The widest that Cycles makes."""
+
 
 @dataclass(frozen=True)
 class WorldSampling:
@@ -31,11 +34,17 @@ class WorldSampling:
     resolution: int = SMALL_TABLE
 
 
-def choose_sampling(residual: NDArray[np.float32] | None) -> WorldSampling:
-    """None or a small table where the residual is calm, Cycles' own large one where it is not."""
+def choose_sampling(residual: NDArray[np.float32] | None, cells: bool = False) -> WorldSampling:
+    """None or a small table where the residual is calm, Cycles' own large one where it is not.
+
+    cells: of a Voronoi map, the table is as wide as the map: a smaller one blends what edges part,
+    a larger one gains nothing (docs/benchmarks/table1.md).
+    """
     if residual is None:
         return WorldSampling("NONE")
     moment, peak = contrast(residual)
+    if cells and moment > CALM_ENOUGH:
+        return WorldSampling("MANUAL", min(residual.shape[1], WIDEST_TABLE))
     if peak > CALM_PEAK:
         return WorldSampling("AUTOMATIC")
     return WorldSampling("NONE" if moment <= CALM_ENOUGH else "MANUAL")

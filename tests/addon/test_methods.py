@@ -46,6 +46,8 @@ def test_a_voronoi_map_is_shown_with_closest_interpolation(scene, sunrise):
     assert not suns(scene)
     texture = scene.world.node_tree.nodes["Sunsplit: Residual"]
     assert texture.interpolation == "Closest"
+    assert scene.world.cycles.sampling_method == "MANUAL"
+    assert scene.world.cycles.sample_map_resolution == 1024
     pixels = np.empty(1024 * 512 * 4, np.float32)
     texture.image.pixels.foreach_get(pixels)
     found = pixels.reshape(512, 1024, 4)[::-1, :, :3]

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sunsplit.core.sampling import choose_sampling, contrast
+from sunsplit.core.sampling import WorldSampling, choose_sampling, contrast
 from tests.maps import sky
 
 
@@ -29,3 +29,10 @@ def test_the_more_peaked_the_larger_the_table(part, method):
 
 def test_without_a_residual_there_is_nothing_to_sample():
     assert choose_sampling(None).method == "NONE"
+
+
+def test_cells_get_a_table_as_wide_as_their_map():
+    pixels = np.full((64, 128, 3), 0.01, np.float32)
+    pixels[20:22, 5:9] = 900
+    assert choose_sampling(pixels, cells=True) == WorldSampling("MANUAL", 128)
+    assert choose_sampling(sky(64, 0.7).astype(np.float32), cells=True).method == "NONE"
