@@ -38,7 +38,7 @@ def choose_sampling(residual: NDArray[np.float32] | None, cells: bool = False) -
     """None or a small table where the residual is calm, Cycles' own large one where it is not.
 
     cells: of a Voronoi map, the table is as wide as the map: a smaller one blends what edges part,
-    a larger one gains nothing (docs/benchmarks/table1.md).
+    Cycles' own takes three times as long for the same picture (docs/benchmarks/table1.md).
     """
     if residual is None:
         return WorldSampling("NONE")
