@@ -78,6 +78,7 @@ def table(runs: Sequence[Run]) -> str:
     maps = sorted({one.map for one in runs})
     lines = [
         f"{len(maps)} maps: {', '.join(maps)}.",
+        "Seconds are of one conversion each on a shared machine: orders of magnitude.",
         "",
         "| map as | method | lights asked | lights made, fewest to most (maps with all) "
         "| largest error of the account | seconds, median (most) |",
