@@ -67,26 +67,27 @@ def edges_across(
     them spread evenly from one end of the light to the other, half where the light is. Returns
     normals (turns * places, 3) and weights; edges that miss the light are in neither.
     """
+    turn = np.arange(turns) * (np.pi / turns)
     first, second = sphere.tangents(centre)
+    across = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * second
     forward = directions @ centre
-    normals, weights = [], []
-    for turn in np.arange(turns) * (np.pi / turns):
-        across = np.cos(turn) * first + np.sin(turn) * second
-        angle = np.arctan(directions @ across / np.where(forward == 0, 1e-300, forward))
-        low, high = float(angle.min()), float(angle.max())
-        # So that an edge on either side lets all through, or nothing.
-        margin = 0.03 * (high - low) + 0.004
-        low, high = max(low - margin, -np.pi / 2), min(high + margin, np.pi / 2)
-        step = (high - low) / FINE
-        place = np.minimum(((angle - low) / step).astype(np.intp), FINE - 1)
-        light = np.bincount(place, weight, FINE)
-        dense = np.cumsum(0.5 / FINE + 0.5 * light / light.sum())
-        ends = np.interp(
-            np.arange(places + 1) / places,
-            np.concatenate([[0], dense]),
-            low + step * np.arange(FINE + 1),
-        )
-        middle = (ends[1:] + ends[:-1]) / 2
-        normals.append(np.cos(middle)[:, None] * across - np.sin(middle)[:, None] * centre)
-        weights.append(np.cos(middle) * np.diff(ends) / (2 * turns))
-    return np.concatenate(normals), np.concatenate(weights)
+    angle = np.arctan((across @ directions.T) / np.where(forward == 0, 1e-300, forward))
+    low, high = angle.min(axis=1), angle.max(axis=1)
+    # So that an edge on either side lets all through, or nothing.
+    margin = 0.03 * (high - low) + 0.004
+    low, high = np.maximum(low - margin, -np.pi / 2), np.minimum(high + margin, np.pi / 2)
+    step = (high - low) / FINE
+    place = ((angle - low[:, None]) / step[:, None]).astype(np.intp)
+    np.minimum(place, FINE - 1, out=place)
+    place += (FINE * np.arange(turns))[:, None]
+    light = np.bincount(place.ravel(), np.tile(weight, turns), FINE * turns).reshape(turns, FINE)
+    dense = np.zeros((turns, FINE + 1))
+    np.cumsum(0.5 / FINE + light * (0.5 / weight.sum()), axis=1, out=dense[:, 1:])
+    wanted, steps = np.arange(places + 1) / places, np.arange(FINE + 1)
+    ends = np.stack([np.interp(wanted, one, steps) for one in dense])
+    ends = low[:, None] + step[:, None] * ends
+    middle = (ends[:, 1:] + ends[:, :-1]) / 2
+    cosine = np.cos(middle)
+    normals = cosine[..., None] * across[:, None] - np.sin(middle)[..., None] * centre
+    weights = cosine * (ends[:, 1:] - ends[:, :-1]) / (2 * turns)
+    return normals.reshape(-1, 3), weights.ravel()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import count as counter
 
@@ -73,11 +73,10 @@ def edge_split(patches: Patches, count: int, shape: Shape, allowed: float = 0.0)
     patches: some, all of them lit. allowed: a part of all light; see `PatchCells.error`.
     """
     light = _Light(patches, shape)
-    owner = np.zeros(len(patches), np.intp)
-    for owner, error in _cuts(light, count):
+    for owner, error in _cuts(light, count):  # noqa: B007
         if error <= allowed:
             break
-    return _balanced(light, owner)
+    return _balanced(light, owner, error)
 
 
 def _cuts(light: _Light, count: int) -> Iterator[tuple[NDArray[np.intp], float]]:
@@ -107,18 +106,19 @@ def _root(heap: list[tuple[float, int, int, NDArray[np.intp]]], finished: float)
     return float(np.sqrt(finished - sum(entry[0] for entry in heap)))
 
 
-def _balanced(light: _Light, owner: NDArray[np.intp]) -> PatchCells:
+def _balanced(light: _Light, owner: NDArray[np.intp], error: float) -> PatchCells:
     """The cells after sharing out their borders, where that is predicted to be truer."""
-    best = light.cells(owner)
-    if len(best.flux) == 1:
-        return best
-    moved = best
-    for step in range(1, STEPS + 1):
-        moved = light.described(light.shared_out(moved))
-        if step in (STEPS // 2, STEPS):
-            judged = light.cells(moved.owner)
-            best = min(best, judged, key=lambda cells: cells.error)
-    return best
+    cells = light.described(owner, error)
+    if len(cells.flux) == 1:
+        return cells
+    steps = [cells]
+    for _ in range(STEPS):
+        steps.append(light.described(light.shared_out(steps[-1])))
+    for step in (STEPS, STEPS // 2):
+        judged = light.judge(steps[step])
+        if judged.error < error:
+            return judged
+    return cells
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +141,26 @@ class _Light:
         return np.stack(
             [self.relative[:, 0], self.relative[:, 2], luminous / luminous.sum()], axis=-1
         )
+
+    @cached_property
+    def light(self) -> Floats:
+        """Of each patch as a part of all light, (p,)."""
+        return self.relative @ SEEN_BY / SEEN_BY.sum()
+
+    @cached_property
+    def weighted(self) -> dict[int, Floats]:
+        """Direction times red and times blue of each patch, (p, 3) each."""
+        return {c: self.relative[:, c, None] * self.patches.directions for c in (0, 2)}
+
+    @cached_property
+    def features(self) -> Floats:
+        """What distances of patches are linear in, (p, 12): direction and 1, both once more times
+        red and times blue against all of the patch's light."""
+        whole = np.maximum(self.light, 1e-300)[:, None]
+        parts = [self.patches.directions, np.ones_like(whole)]
+        for channel, vector in self.weighted.items():
+            parts += [vector / whole, self.relative[:, channel, None] / whole]
+        return np.concatenate(parts, axis=1)
 
     @cached_property
     def half_width(self) -> Floats:
@@ -174,24 +194,23 @@ class _Light:
         first = offset @ axes[:, -1] < 0
         return first if first.any() and not first.all() else None
 
-    def described(self, owner: NDArray[np.intp]) -> PatchCells:
-        """Cells by their moments alone; those that have lost all patches are left out."""
+    def described(self, owner: NDArray[np.intp], error: float = np.inf) -> PatchCells:
+        """Cells by their moments; those that have lost all patches are left out."""
         occupied, owner = np.unique(owner, return_inverse=True)
         count = len(occupied)
         weight = self._weight(slice(None), owner, count)
         to_light, shortfall = _moments(
             self.patches.directions, self.patches.spread, weight, owner, count
         )
-        return PatchCells(owner, _sums(owner, self.patches.flux, count), to_light, shortfall, np.inf)
+        flux = _sums(owner, self.patches.flux, count)
+        return PatchCells(owner, flux, to_light, shortfall, error)
 
-    def cells(self, owner: NDArray[np.intp]) -> PatchCells:
-        """Cells with their predicted error."""
-        described = self.described(owner)
-        groups = _groups(described.owner, len(described.flux))
+    def judge(self, cells: PatchCells) -> PatchCells:
+        """The same cells with their predicted error."""
+        ends = np.cumsum(np.bincount(cells.owner))
+        groups = np.split(np.argsort(cells.owner, kind="stable"), ends[:-1])
         error = float(np.sqrt(sum(self.squared_error(members) for members in groups)))
-        return PatchCells(
-            described.owner, described.flux, described.to_light, described.shortfall, error
-        )
+        return replace(cells, error=error)
 
     def shared_out(self, cells: PatchCells) -> NDArray[np.intp]:
         """For each patch the cell that is best to have it: a new owner, (p,).
@@ -199,21 +218,21 @@ class _Light:
         Near, in a measure of each cell's own: bright and narrow cells take little from around
         them. And where it brings the colours of a cell back together.
         """
-        directions, count = self.patches.directions, len(cells.flux)
-        light = self.relative @ SEEN_BY / SEEN_BY.sum()
+        count = len(cells.flux)
         of_cell = _sums(cells.owner, self.relative, count)
         whole = of_cell @ SEEN_BY / SEEN_BY.sum()
-        distance = 2 - 2 * (directions @ cells.to_light.T)
+        scale = np.sqrt(whole / (2 * np.maximum(cells.shortfall, 1e-9)))
+        # The squared chord, 2 - 2 cos, and how far a channel's mean lies aside of the cell's: both
+        # linear in a patch's direction, so that one product of matrices holds them all.
+        of_cells = [-2 * cells.to_light * scale[:, None], 2 * scale[:, None]]
         for channel in (0, 2):
-            own = self.relative[:, channel]
-            vector = _sums(cells.owner, own[:, None] * directions, count)
+            vector = _sums(cells.owner, self.weighted[channel], count)
             aside = vector - of_cell[:, channel, None] * cells.to_light
-            aside *= (TOGETHER / np.maximum(whole, 1e-300))[:, None]
-            away = directions @ aside.T - (aside * cells.to_light).sum(axis=1)
-            distance += (own / np.maximum(light, 1e-300))[:, None] * away
-        distance *= np.sqrt(whole / (2 * np.maximum(cells.shortfall, 1e-9)))
+            aside *= (TOGETHER * scale / np.maximum(whole, 1e-300))[:, None]
+            of_cells += [aside, -(aside * cells.to_light).sum(axis=1)[:, None]]
+        distance = self.features @ np.concatenate(of_cells, axis=1).T
         owner = np.argmin(distance, axis=1)
-        stays = light > HEAVY * whole[cells.owner]
+        stays = self.light > HEAVY * whole[cells.owner]
         owner[stays] = cells.owner[stays]
         return owner
 
@@ -246,8 +265,3 @@ def _moments(
 def _sums(owner: NDArray[np.intp], values: Floats, count: int) -> Floats:
     return np.stack([np.bincount(owner, one, count) for one in values.T], axis=-1)
 
-
-def _groups(owner: NDArray[np.intp], count: int) -> list[NDArray[np.intp]]:
-    """Patches of each cell."""
-    ends = np.cumsum(np.bincount(owner, minlength=count))
-    return np.split(np.argsort(owner, kind="stable"), ends[:-1])
