@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from .account import Account, settle
 from .environment import EnvironmentMap
-from .placement.choice import edge_suns
-from .placement.sampled import sampled_suns
+from .placement.choice import choose_suns
 from .progress import Progress, silent
-from .region import light_of_region_a
+from .region import light_for_suns
 from .residual import reduced, without
 from .samples import MapOfSamples, map_of_samples
 from .settings import ConversionSettings
@@ -25,7 +24,8 @@ class Conversion:
     """What became of a map.
 
     suns: brightest first. residual: float32 (height, width, 3) of the width that was asked for,
-    or None. samples: what a Voronoi residual was made of, else None.
+    or None. samples: what a Voronoi residual was made of, else None. predicted_error: what
+    shadows of the suns are wrong by, as a part of the mean irradiance; see `prediction.Prediction`.
     notes: plain sentences for the user.
     """
 
@@ -36,6 +36,7 @@ class Conversion:
     residual: NDArray[np.float32] | None
     samples: MapOfSamples | None
     account: Account
+    predicted_error: float
     notes: tuple[str, ...]
 
 
@@ -49,21 +50,31 @@ def convert(
     progress("strata", 0.0)
     strata = stratify(environment, settings.share, settings.strata)
     progress("region A", 0.3)
-    light = light_of_region_a(environment, strata, settings.filled)
+    light, notes = light_for_suns(environment, strata, settings)
     progress("suns", 0.5)
-    choose_suns = edge_suns if settings.method == "edge" else sampled_suns
     chosen = choose_suns(light, strata, settings)
     progress("residual", 0.7)
-    residual, samples, notes = None, None, (*_share_note(strata, settings), *chosen.notes)
+    residual, samples = None, None
+    notes = (*_share_note(strata, settings), *notes, *chosen.notes)
     if settings.leaves_residual:
-        residual = reduced(without(environment, chosen.replaced), settings.residual_width)
+        residual = reduced(without(environment, light), settings.residual_width)
         if settings.residual == "voronoi":
             samples, more = map_of_samples(residual, settings)
             residual, notes = samples.radiance, notes + more
     progress("account", 0.9)
     account = settle(environment.radiance, chosen.suns, residual)
     progress("done", 1.0)
-    return Conversion(environment, settings, strata, chosen.suns, residual, samples, account, notes)
+    return Conversion(
+        environment,
+        settings,
+        strata,
+        chosen.suns,
+        residual,
+        samples,
+        account,
+        chosen.predicted_error,
+        notes,
+    )
 
 
 def _share_note(strata: Strata, settings: ConversionSettings) -> tuple[str, ...]:

@@ -73,7 +73,7 @@ class Moments:
 
     @cached_property
     def shortfall(self) -> Floats:
-        """1 - R of each cell, (n,); see `Cell.shortfall`."""
+        """1 - R of each cell, (n,); R is the length of its mean direction."""
         apart = np.zeros(self.count)
         for part, directions in self._blocks():
             owner = self.owner[part]

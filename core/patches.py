@@ -103,7 +103,9 @@ def _limit(badness: list[Floats], most: int) -> float:
     return float(np.partition(all_of_them, -divisions - 1)[-divisions - 1])
 
 
-def _blocks(sums: Floats, peaks: Floats, rows: NDArray[np.intp], k: int, light: RegionLight) -> Patches:
+def _blocks(
+    sums: Floats, peaks: Floats, rows: NDArray[np.intp], k: int, light: RegionLight
+) -> Patches:
     """Blocks of 2^k pixels along a side, in these rows of blocks, as patches."""
     luminous, vector = sums[:, 3], sums[:, 4:]
     length = np.linalg.norm(vector, axis=1)
@@ -146,5 +148,3 @@ def _pyramid(light: RegionLight, brightness: Floats) -> tuple[list[Floats], list
         pairs = np.maximum(below[::2], below[1::2])
         peaks.append(np.maximum(pairs[:, ::2], pairs[:, 1::2]))
     return sums, peaks
-
-

@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
-from .cells import Cell
 from .environment import EnvironmentMap
 from .errors import UnusableInput
 from .region import RegionLight
 from .tolerances import ROUNDED
 
 
-def without(
-    environment: EnvironmentMap, replaced: Sequence[Cell | RegionLight]
-) -> NDArray[np.float32]:
-    """The map less this light, float32 (height, width, 3)."""
+def without(environment: EnvironmentMap, light: RegionLight) -> NDArray[np.float32]:
+    """The map less some light, float32 (height, width, 3)."""
     solid = sphere.row_solid_angles(environment.width, environment.height)
     residual = environment.radiance.copy()
     flat = residual.reshape(-1, 3)
-    for light in replaced:
-        before = flat[light.pixels].astype(np.float64)
-        rest = before - light.flux / solid[light.pixels // environment.width, None]
-        # What the division has rounded is no light: black must be black.
-        flat[light.pixels] = np.where(rest > ROUNDED * before, rest, 0)
+    before = flat[light.pixels].astype(np.float64)
+    rest = before - light.flux / solid[light.pixels // environment.width, None]
+    # What the division has rounded is no light: black must be black.
+    flat[light.pixels] = np.where(rest > ROUNDED * before, rest, 0)
     return residual
 
 

@@ -19,6 +19,13 @@ MOST = {"lights": 10_000, "samples": 50_000, "residual_samples": 20_000}
 """The largest numbers, for which every method is done in a minute or so on a map 1024 wide."""
 
 
+TOLERANCE = 0.5
+"""Predicted error in percent up to which lights are chosen by themselves: nobody sees it."""
+
+MOST_BY_ITSELF = 256
+"""So many lights at most are chosen by themselves."""
+
+
 class BadSetting(SunsplitError):
     """A setting outside its limits."""
 
@@ -27,13 +34,15 @@ class BadSetting(SunsplitError):
 class ConversionSettings:
     """How to split a map.
 
-    lights: at most so many suns.
+    lights: at most so many suns, used up where they help, or None: as few as `tolerance` allows.
+    tolerance: predicted error in percent of the mean irradiance (see `prediction`), at which no
+        more lights are added; None: 0.5 where `lights` is None, and nothing to stop at otherwise.
     share: the part of all light in region A, 0 to 1, or None: chosen for the map.
         0 leaves the whole map in region B; 1 turns all of it into suns and leaves no residual.
     strata: how many strata of luminance, an even number; half of them make up region A.
-    method: how lights are placed in region A. "edge": whole lights, cut where one disc would cast
-        wrong shadows. "penrose" (the paper's), "median-cut", "variance", "kmeans": samples of
-        region A by importance, and a light for the cell of each.
+    method: how lights are placed in region A. "edge": in cells for the truest shadows. "penrose"
+        (the paper's), "median-cut", "variance", "kmeans": samples of region A by importance, and
+        a light for the cell of each.
     samples: so many are placed and clustered down to `lights`; None: as few as leave `lights` once
         those nearer than a pixel are clustered.
     per_stratum: each bright stratum is sampled on its own, and no cell reaches into another.
@@ -49,7 +58,8 @@ class ConversionSettings:
         with the method "edge", black with the others.
     """
 
-    lights: int = 16
+    lights: int | None = None
+    tolerance: float | None = None
     share: float | None = None
     strata: int = 2
     method: Method = "edge"
@@ -68,6 +78,8 @@ class ConversionSettings:
             value = getattr(self, name)
             if value is not None and not 1 <= value <= most:
                 raise BadSetting(f"{name} must be 1 to {most:,}, not {value:,}.")
+        if self.tolerance is not None and not 0 < self.tolerance <= 100:
+            raise BadSetting(f"tolerance must be above 0 and at most 100, not {self.tolerance:g}.")
         if self.share is not None and not 0 <= self.share <= 1:
             raise BadSetting(f"share must be 0 to 1, not {self.share:g}.")
         if self.strata < 2 or self.strata % 2:
@@ -88,6 +100,16 @@ class ConversionSettings:
     def filled(self) -> Fill:
         """What the residual shows in region A, with None resolved."""
         return self.fill or ("surroundings" if self.method == "edge" else "black")
+
+    @property
+    def most_lights(self) -> int:
+        """The number of lights that must not be exceeded."""
+        return MOST_BY_ITSELF if self.lights is None else self.lights
+
+    @property
+    def allowed(self) -> float | None:
+        """The tolerance in percent, with None resolved; None still where all lights are wanted."""
+        return TOLERANCE if self.lights is None and self.tolerance is None else self.tolerance
 
     def as_dict(self) -> dict[str, object]:
         return asdict(self)

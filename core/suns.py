@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import disc_diameter
-
 
 @dataclass(frozen=True, eq=False)
 class Sun:
@@ -37,11 +35,20 @@ def disc_sun(
 ) -> Sun:
     """The disc whose total, mean direction and second moment are those of a cell.
 
-    flux: scalar irradiance, (3,). shortfall: see `Cell.shortfall`. A cap of half-angle a gives a
+    flux: scalar irradiance, (3,). shortfall: 1 - R, where R is the length of the cell's
+    mean direction. A cap of half-angle a gives a
     facing surface (1 + cos a) / 2 of its scalar irradiance.
     """
     diameter = disc_diameter(shortfall)
     return Sun(to_light, flux * (1 + np.cos(diameter / 2)) / 2, flux, diameter, stratum)
+
+
+def disc_diameter(shortfall: float) -> float:
+    """Diameter in radians, at most pi, of a uniform disc by its 1 - R.
+
+    Such a disc has R = (1 + cos a) / 2, so a = 2 asin sqrt(1 - R); a hemisphere at most.
+    """
+    return min(4 * float(np.arcsin(np.sqrt(min(shortfall, 0.5)))), np.pi)
 
 
 def point_sun(flux: NDArray[np.float64], to_light: NDArray[np.float64], stratum: int) -> Sun:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import sphere
-from ..cells import Cell
 from ..region import RegionLight
 from ..suns import Sun
 from ..voronoi import label_map, nearest
@@ -41,26 +40,14 @@ class Placement:
 
 @dataclass(frozen=True, eq=False)
 class ChosenSuns:
-    """Suns, brightest first, the light of the map that they replace, and notes for the user."""
+    """Suns, brightest first, and notes for the user.
+
+    predicted_error: see `prediction.Prediction`; nan before it is known.
+    """
 
     suns: tuple[Sun, ...]
-    replaced: tuple[Cell | RegionLight, ...]
+    predicted_error: float
     notes: tuple[str, ...]
-
-
-WIDEST_DISC = np.radians(45)
-"""A lamp of 74 degrees made a picture 29 % wrong: wider ones are avoided, or at least named."""
-
-
-def widest_note(suns: Sequence[Sun]) -> list[str]:
-    """What the user should know of suns that had to be wide."""
-    widest = max((sun.angular_diameter for sun in suns), default=0.0)
-    if widest <= WIDEST_DISC:
-        return []
-    return [
-        f"The widest sun spans {np.degrees(widest):.0f}° and stands for its light only roughly: "
-        "more lights or a smaller share would be truer."
-    ]
 
 
 Place = Callable[[RegionLight, int], Placement]

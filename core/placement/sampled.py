@@ -17,7 +17,7 @@ from ..region import RegionLight
 from ..settings import ConversionSettings
 from ..strata import Strata
 from ..suns import Sun, disc_sun, point_sun
-from .placement import NO_SUN, ChosenSuns, Place, Placement, method_named, widest_note
+from .placement import ChosenSuns, Place, Placement, method_named
 
 MOST_SAMPLES = 256
 """At most so many samples are tried for each light."""
@@ -33,33 +33,25 @@ FEW_PIXELS = 5000
 """Pixels up to which a sample in each of them is clustered: in about a second."""
 
 
-def sampled_suns(light: RegionLight, strata: Strata, settings: ConversionSettings) -> ChosenSuns:
-    """At most `settings.lights` suns that hold all of the light."""
-    light = light.part(light.luminous_flux > 0)
-    if not len(light.pixels):
-        return ChosenSuns((), (), (NO_SUN,) if settings.share is None else ())
+def sampled_suns(
+    light: RegionLight, strata: Strata, settings: ConversionSettings, lights: int
+) -> ChosenSuns:
+    """At most `lights` suns that hold all of the light, of which every pixel shines."""
     parts, notes = [light], []
     if settings.per_stratum:
         parts = _by_stratum(light, strata)
-        if len(parts) > settings.lights:
+        if len(parts) > lights:
             notes.append(f"{len(parts)} strata want as many lights: placed in all of them at once.")
             parts = [light]
     suns = []
-    for part, lights in zip(parts, _shared_out(parts, settings.lights), strict=True):
-        placement = sample(part, int(lights), settings, _samples(lights, settings))
+    for part, count in zip(parts, _shared_out(parts, lights), strict=True):
+        samples = settings.samples and max(round(count * settings.samples / lights), 1)
+        placement = sample(part, int(count), settings, samples)
         suns += _suns(part, placement, strata, settings)
     suns.sort(key=lambda sun: -float(sun.scalar_irradiance @ LUMINANCE_WEIGHTS))
-    if len(suns) < settings.lights:
-        notes.append(_fewer(len(suns), light, settings))
-    notes += widest_note(suns)
-    return ChosenSuns(tuple(suns), (light,), tuple(notes))
-
-
-def _samples(lights: int, settings: ConversionSettings) -> int | None:
-    """How many samples the user wants for a part of the lights."""
-    if settings.samples is None:
-        return None
-    return max(round(lights * settings.samples / settings.lights), 1)
+    if settings.lights and len(suns) < lights:
+        notes.append(_fewer(len(suns), light, settings, lights))
+    return ChosenSuns(tuple(suns), np.nan, tuple(notes))
 
 
 def sample(
@@ -193,13 +185,13 @@ def _shared_out(parts: list[RegionLight], lights: int) -> NDArray[np.intp]:
     return shares
 
 
-def _fewer(count: int, light: RegionLight, settings: ConversionSettings) -> str:
+def _fewer(count: int, light: RegionLight, settings: ConversionSettings, lights: int) -> str:
     pixels = len(light.pixels)
-    if pixels <= settings.lights:
+    if pixels <= lights:
         shine = "1 pixel that shines" if pixels == 1 else f"{pixels} pixels that shine"
         why = f"region A has only {shine}"
-    elif settings.samples and settings.samples < settings.lights:
+    elif settings.samples and settings.samples < lights:
         why = f"{settings.samples} samples were placed"
     else:
         why = "samples nearer than a pixel were clustered"
-    return f"{count} of {settings.lights} lights: {why}."
+    return f"{count} of {lights} lights: {why}."

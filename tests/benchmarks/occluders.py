@@ -119,7 +119,9 @@ def light_of(environment: EnvironmentMap) -> tuple[Floats, Floats]:
             for right in range(fine):
                 column = columns * fine + right
                 directions.append(
-                    sphere.pixel_directions(row * (width * fine) + column, width * fine, height * fine)
+                    sphere.pixel_directions(
+                        row * (width * fine) + column, width * fine, height * fine
+                    )
                 )
                 light.append(flux[pixels] * part[:, None])
     return np.concatenate(directions), np.concatenate(light)

@@ -1,0 +1,46 @@
+"""Suns by the method "edge": cells for the truest shadows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..environment import LUMINANCE_WEIGHTS
+from ..patches import Patches
+from ..settings import ConversionSettings
+from ..strata import Strata
+from ..suns import Sun, disc_sun, point_sun
+from .edge_split import PatchCells, edge_split
+from .placement import ChosenSuns
+
+NO_TRUER = 5e-5
+"""Predicted error, as a part of all light, below which more lights are not used: a twentieth of
+what any picture shows."""
+
+
+def edge_suns(
+    patches: Patches, strata: Strata, settings: ConversionSettings, lights: int
+) -> ChosenSuns:
+    """At most `lights` suns for light that is cut into patches, one patch at least."""
+    share = float((patches.flux @ LUMINANCE_WEIGHTS).sum()) / strata.light
+    cells = edge_split(patches, lights, settings.shape, NO_TRUER / share)
+    notes = ()
+    if settings.samples or settings.per_stratum or settings.position == "sample":
+        notes = ("Samples, per stratum and position are of the other methods: edge has none.",)
+    return ChosenSuns(_suns(cells, patches, strata, settings), np.nan, notes)
+
+
+def _suns(
+    cells: PatchCells, patches: Patches, strata: Strata, settings: ConversionSettings
+) -> tuple[Sun, ...]:
+    brightest = np.zeros(len(cells.flux))
+    np.maximum.at(brightest, cells.owner, patches.brightness)
+    suns = []
+    for cell in np.argsort(-(cells.flux @ LUMINANCE_WEIGHTS), kind="stable"):
+        flux, to_light = cells.flux[cell], cells.to_light[cell]
+        # The rim of a light may be darker than region A, but belongs to it.
+        stratum = max(strata.stratum(float(brightest[cell])), strata.count // 2 + 1)
+        if settings.shape == "point":
+            suns.append(point_sun(flux, to_light, stratum))
+        else:
+            suns.append(disc_sun(flux, to_light, float(cells.shortfall[cell]), stratum))
+    return tuple(suns)
