@@ -60,6 +60,7 @@ def draw_settings(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
     sampled = settings.method != "edge"
     layout.prop(settings, "method")
     layout.prop(settings, "lights")
+    layout.prop(settings, "tolerance")
     layout.prop(settings, "shape")
     layout.prop(settings, "share_auto")
     _row(layout, settings, "share", not settings.share_auto)

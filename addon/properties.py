@@ -11,7 +11,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..core.settings import MOST, ConversionSettings
+from ..core.settings import MOST, TOLERANCE, ConversionSettings
 
 DEFAULTS = ConversionSettings()
 
@@ -21,12 +21,25 @@ _FRESH: set[str] = {"SKIP_SAVE"}
 CHOICES = {
     "lights": IntProperty(
         name="Lights",
-        description="At most so many sun lamps. Whole lights: fainter ones stay in the world",
-        default=DEFAULTS.lights,
+        description="At most so many sun lamps, used up where they make shadows truer; "
+        "0: as few as the tolerance allows",
+        default=0,
         options=_FRESH,
-        min=1,
+        min=0,
         max=MOST["lights"],
         soft_max=64,
+    ),
+    "tolerance": FloatProperty(
+        name="Tolerance",
+        description="How wrong shadows may be by prediction, in percent of the mean light: more "
+        f"lamps are not made. 0: {TOLERANCE:g} % where Lights is 0, else none",
+        default=0.0,
+        options=_FRESH,
+        min=0.0,
+        max=100.0,
+        soft_max=10.0,
+        precision=2,
+        subtype="PERCENTAGE",
     ),
     "share_auto": BoolProperty(
         name="Automatic Share",
@@ -59,8 +72,8 @@ CHOICES = {
         items=[
             (
                 "edge",
-                "Whole Lights",
-                "A lamp for each light, cut where its shadow would be wrong",
+                "Truest Shadows",
+                "Cells of light, cut and balanced where a lamp's shadow would be most wrong",
             ),
             (
                 "penrose",

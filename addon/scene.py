@@ -48,6 +48,8 @@ def settings_for(chosen: Mapping[str, Any]) -> ConversionSettings:
         **values
         | {
             "share": share,
+            "lights": values["lights"] or None,
+            "tolerance": values["tolerance"] or None,
             # The slider can stop at an odd number; the next even one is meant.
             "strata": values["strata"] + values["strata"] % 2,
             "samples": values["samples"] or None,
@@ -118,6 +120,8 @@ def _swap_overrides(
 
 def _sentences(conversion: Conversion) -> list[str]:
     lines = []
+    if conversion.suns:
+        lines.append(f"Shadows right within {conversion.predicted_error:.2%}, by prediction")
     if conversion.residual is not None:
         error = conversion.account.relative_error.max()
         lines.append(f"Account: lamps + world = map within {error:.0e}")

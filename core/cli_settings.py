@@ -6,7 +6,16 @@ import argparse
 from typing import get_args
 
 from .figure_settings import FigureSettings
-from .settings import ConversionSettings, Fill, Frequency, Method, Position, ResidualKind, Shape
+from .settings import (
+    TOLERANCE,
+    ConversionSettings,
+    Fill,
+    Frequency,
+    Method,
+    Position,
+    ResidualKind,
+    Shape,
+)
 
 DEFAULTS = ConversionSettings()
 FIGURES = FigureSettings()
@@ -23,6 +32,7 @@ def settings_from(options: argparse.Namespace) -> ConversionSettings:
     """What was chosen."""
     return ConversionSettings(
         lights=options.lights,
+        tolerance=options.tolerance,
         share=options.share,
         strata=options.strata,
         method=options.method,
@@ -108,16 +118,22 @@ def _add_bright(group: argparse._ArgumentGroup) -> None:
 def _add_placement(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--lights",
-        type=_count,
-        default=DEFAULTS.lights,
+        type=_lights,
         metavar="N",
-        help="at most N suns (default: %(default)s)",
+        help="at most N suns, or auto (default): as few as the tolerance allows",
+    )
+    group.add_argument(
+        "--tolerance",
+        type=_percent,
+        metavar="PERCENT",
+        help="how wrong shadows may be by prediction, of the mean irradiance (default: "
+        f"{TOLERANCE:g} with --lights auto, else none)",
     )
     group.add_argument(
         "--method",
         choices=get_args(Method),
         default=DEFAULTS.method,
-        help="how lights are placed (default: edge: whole lights, cut where shadows need it; "
+        help="how lights are placed (default: edge: in cells for the truest shadows; "
         "the others place samples by importance, a light for the cell of each)",
     )
     group.add_argument(
@@ -175,6 +191,24 @@ def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number from 1 up")
     return int(text)
+
+
+def _lights(text: str) -> int | None:
+    if text == "auto":
+        return None
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor a number from 1 up")
+    return int(text)
+
+
+def _percent(text: str) -> float:
+    try:
+        percent = float(text.removesuffix("%"))
+    except ValueError:
+        percent = -1.0
+    if not 0 < percent <= 100:
+        raise argparse.ArgumentTypeError(f"{text!r} is no percentage above 0 and up to 100")
+    return percent
 
 
 def _strata(text: str) -> int:

@@ -57,6 +57,8 @@ def _sun_lines(conversion: Conversion) -> list[str]:
         )
     if len(conversion.suns) > LISTED:
         lines.append(f"       and {len(conversion.suns) - LISTED} more")
+    if conversion.suns:
+        lines.append(f"shadows predicted to be right within {conversion.predicted_error:.2%}")
     return [*lines, *conversion.notes]
 
 

@@ -19,8 +19,12 @@ MOST = {"lights": 10_000, "samples": 50_000, "residual_samples": 20_000}
 """The largest numbers, for which every method is done in a minute or so on a map 1024 wide."""
 
 
-TOLERANCE = 0.5
-"""Predicted error in percent up to which lights are chosen by themselves: nobody sees it."""
+TOLERANCE = 1.0
+"""Predicted error, in percent of the mean irradiance, that the program allows by itself: side by
+side, eyes tell about so much apart."""
+
+OF_OWN_LIGHT = 0.05
+"""And as a part of what the suns give: a few faint lights must not become one wide one."""
 
 MOST_BY_ITSELF = 256
 """So many lights at most are chosen by themselves."""
@@ -36,7 +40,8 @@ class ConversionSettings:
 
     lights: at most so many suns, used up where they help, or None: as few as `tolerance` allows.
     tolerance: predicted error in percent of the mean irradiance (see `prediction`), at which no
-        more lights are added; None: 0.5 where `lights` is None, and nothing to stop at otherwise.
+        more lights are added; None: 1, and a twentieth of what the suns give, where `lights` is
+        None; nothing to stop at otherwise.
     share: the part of all light in region A, 0 to 1, or None: chosen for the map.
         0 leaves the whole map in region B; 1 turns all of it into suns and leaves no residual.
     strata: how many strata of luminance, an even number; half of them make up region A.
@@ -106,10 +111,12 @@ class ConversionSettings:
         """The number of lights that must not be exceeded."""
         return MOST_BY_ITSELF if self.lights is None else self.lights
 
-    @property
-    def allowed(self) -> float | None:
-        """The tolerance in percent, with None resolved; None still where all lights are wanted."""
-        return TOLERANCE if self.lights is None and self.tolerance is None else self.tolerance
+    def allowed_error(self, share: float) -> float | None:
+        """The tolerance in percent for suns with this share of all light, with None resolved; None
+        still where as many lights as asked for are wanted."""
+        if self.lights is None and self.tolerance is None:
+            return min(TOLERANCE, 100 * OF_OWN_LIGHT * share)
+        return self.tolerance
 
     def as_dict(self) -> dict[str, object]:
         return asdict(self)

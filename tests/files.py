@@ -24,7 +24,7 @@ def noise(height: int = 16, seed: int = 1) -> np.ndarray:
 def sunny(width: int = 128, radiance: float = 20000.0) -> np.ndarray:
     """A sky with one sun 40 degrees up, float32."""
     pixels = sky(width)
-    paint_disc(pixels, direction(60, 40), 3, radiance)
+    paint_disc(pixels, direction(60, 40), 6, radiance)
     return pixels.astype(np.float32)
 
 

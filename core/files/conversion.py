@@ -66,7 +66,10 @@ def describe(conversion: Conversion) -> dict[str, Any]:
         residual = {"file": name, "kind": kind, "width": width, "height": height}
     if conversion.samples is not None:
         residual["samples"] = f"{environment.name}.samples.json"
-    settings = conversion.settings.as_dict() | {
+    chosen = conversion.settings
+    settings = chosen.as_dict() | {
+        "lights": chosen.lights or len(conversion.suns),
+        "tolerance": chosen.allowed_error(account.share),
         "share": conversion.strata.share,
         "threshold": conversion.strata.threshold,
         "fill": conversion.settings.filled,
@@ -84,6 +87,7 @@ def describe(conversion: Conversion) -> dict[str, Any]:
         "suns": [lights_json.sun_as_dict(sun) for sun in conversion.suns],
         "residual": residual,
         "account": lights_json.account_as_dict(account),
+        "predicted_error": {"shadow_edges_percent": 100 * conversion.predicted_error},
         "notes": [*environment.warnings, *conversion.notes],
     }
 

@@ -30,17 +30,21 @@ def choose_suns(light: RegionLight, strata: Strata, settings: ConversionSettings
             chosen = sampled_suns(light, strata, settings, count)
         return replace(chosen, predicted_error=prediction.error(chosen.suns))
 
-    if settings.allowed is None:
+    share = float(light.luminous_flux.sum()) / strata.light
+    allowed = settings.allowed_error(share)
+    if allowed is None:
         chosen = with_lights(settings.most_lights)
     else:
-        chosen = fewest(with_lights, settings.allowed / 100, settings.most_lights)
-    notes = (*chosen.notes, *_count_note(chosen, light, settings))
+        chosen = fewest(with_lights, allowed / 100, settings.most_lights)
+    notes = (*chosen.notes, *_count_note(chosen, light, settings, allowed))
     return replace(chosen, notes=notes)
 
 
-def _count_note(chosen: ChosenSuns, light: RegionLight, settings: ConversionSettings) -> list[str]:
+def _count_note(
+    chosen: ChosenSuns, light: RegionLight, settings: ConversionSettings, allowed: float | None
+) -> list[str]:
     """Why there are not as many lights as were asked for, or not as few errors."""
-    made, asked, allowed = len(chosen.suns), settings.lights, settings.allowed
+    made, asked = len(chosen.suns), settings.lights
     percent = 100 * chosen.predicted_error
     if allowed is not None and percent > allowed:
         more = "" if asked else ": set the number of lights for more"

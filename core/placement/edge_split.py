@@ -69,15 +69,18 @@ class PatchCells:
 
 
 def edge_split(patches: Patches, count: int, shape: Shape, allowed: float = 0.0) -> PatchCells:
-    """At most `count` cells, or as few as are predicted to be wrong by no more than `allowed`.
+    """At most `count` cells: as many as make the predicted error smaller, until it is `allowed`.
 
     patches: some, all of them lit. allowed: a part of all light; see `PatchCells.error`.
     """
     light = _Light(patches, shape)
-    for owner, error in _cuts(light, count):  # noqa: B007
+    best, least = np.zeros(len(patches), np.intp), np.inf
+    for owner, error in _cuts(light, count):
+        if error < least:  # a round sun cut in two is two bad halves
+            best, least = owner.copy(), error
         if error <= allowed:
             break
-    return _balanced(light, owner, error)
+    return _balanced(light, best, least)
 
 
 def _cuts(light: _Light, count: int) -> Iterator[tuple[NDArray[np.intp], float]]:

@@ -19,7 +19,7 @@ def scene():
 
 
 def one_sun(folder, name, azimuth):
-    pixels = sky(128, 0.4)
+    pixels = sky(256, 0.4)
     paint_disc(pixels, direction(azimuth, 30), 4, (900, 900, 900))
     return write_map(folder / name, pixels)
 

@@ -297,13 +297,6 @@ def test_a_share_that_cannot_be_is_named(sunrise):
             assert "needs no sun" not in " ".join(notes)
 
 
-def test_wide_lamps_are_named(sunrise):
-    few = ConversionSettings(method="median-cut", share=1, lights=2)
-    assert "widest sun spans" in " ".join(convert(load(sunrise), few).notes)
-    points = ConversionSettings(method="median-cut", share=1, lights=2, shape="point")
-    assert convert(load(sunrise), points).notes == ()
-
-
 def test_edge_says_what_it_does_not_do(sunrise):
     notes = convert(load(sunrise), ConversionSettings(per_stratum=True)).notes
     assert "edge has none" in " ".join(notes)
