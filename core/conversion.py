@@ -11,12 +11,14 @@ from .account import Account, settle
 from .environment import EnvironmentMap
 from .placement.choice import choose_suns
 from .progress import Progress, silent
-from .region import light_for_suns
+from .region import light_of_map, light_of_region_a
 from .residual import reduced, without
 from .samples import MapOfSamples, map_of_samples
 from .settings import ConversionSettings
-from .strata import Strata, stratify
+from .share import choose_strata
+from .strata import Strata
 from .suns import Sun
+from .whole_lights import suns_for_whole_lights
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,16 +50,22 @@ def convert(
     """Split a map into suns (region A) and a residual map (region B)."""
     settings = settings or ConversionSettings()
     progress("strata", 0.0)
-    strata = stratify(environment, settings.share, settings.strata)
+    strata = choose_strata(environment, settings)
     progress("region A", 0.3)
-    light, notes = light_for_suns(environment, strata, settings)
+    light = light_of_region_a(environment, strata, settings.filled)
     progress("suns", 0.5)
-    chosen = choose_suns(light, strata, settings)
+    if settings.takes_whole_lights:
+        light, chosen, notes = suns_for_whole_lights(light, strata, settings)
+        rest = without(environment, light)
+    else:
+        rest, notes = without(environment, light), ()
+        unshadowed = None if settings.shadowed_residual else light_of_map(rest)
+        chosen = choose_suns(light, strata, settings, unshadowed)
     progress("residual", 0.7)
     residual, samples = None, None
     notes = (*_share_note(strata, settings), *notes, *chosen.notes)
     if settings.leaves_residual:
-        residual = reduced(without(environment, light), settings.residual_width)
+        residual = reduced(rest, settings.residual_width)
         if settings.residual == "voronoi":
             samples, more = map_of_samples(residual, settings)
             residual, notes = samples.radiance, notes + more

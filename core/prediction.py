@@ -33,8 +33,8 @@ CONES = np.radians([3, 50])
 NEAR = np.radians(10)
 """A wall's edge passes at most so far from what it is aimed at."""
 
-PIECES = 16_384
-"""Points that stand for all discs together; each disc gets 64 to 2,048."""
+PIECES = 8192
+"""Points that stand for all discs together; each disc gets 32 to 1,024."""
 
 SHARP = 1e-7
 """Half the width of a point, radians."""
@@ -64,20 +64,30 @@ class Surfaces:
         seen *= np.maximum(directions @ self.normals.T, 0)
         return flux @ seen
 
+    def of(self, patches: Patches) -> Floats:
+        """Of each surface, luminance, (s,)."""
+        flux = patches.flux @ LUMINANCE_WEIGHTS
+        return self.irradiance(patches.directions, flux, half_widths(patches.spread))
 
-def surfaces_for(patches: Patches, share: float) -> Surfaces:
+    def in_the_open(self) -> Surfaces:
+        """The same surfaces without anything in front of them."""
+        return Surfaces(self.normals, self.axes, np.full_like(self.radii, SHARP))
+
+
+def surfaces_for(light: Sequence[Patches], all_light: float) -> Surfaces:
     """SURFACES surfaces, half of them behind walls and half behind cones.
 
-    share: the part of all light that the patches hold; the rest is right whatever stands in front
-    of it, so that fewer of the occluders matter.
+    light: what may be wrong. all_light: of the whole map; the rest of it is right whatever stands
+    in front of it, so that fewer of the occluders matter.
     """
     random = np.random.default_rng(0)
     target = _unit(random.normal(size=(SURFACES, 3)))
-    aimed = round(AIMED * share * SURFACES)
+    sums = np.cumsum(np.concatenate([some.flux @ LUMINANCE_WEIGHTS for some in light]))
+    aimed = round(AIMED * min(float(sums[-1]) / all_light, 1) * SURFACES)
     if aimed:
-        light = np.cumsum(patches.flux @ LUMINANCE_WEIGHTS)
-        at = (np.arange(aimed) + 0.5) / aimed * light[-1]
-        target[:aimed] = patches.directions[np.minimum(np.searchsorted(light, at), len(light) - 1)]
+        at = (np.arange(aimed) + 0.5) / aimed * sums[-1]
+        directions = np.concatenate([some.directions for some in light])
+        target[:aimed] = directions[np.minimum(np.searchsorted(sums, at), len(sums) - 1)]
     order = random.permutation(SURFACES)  # so that walls and cones are aimed alike
     target = target[order]
     walls = np.arange(SURFACES) % 2 == 0
@@ -90,7 +100,7 @@ def surfaces_for(patches: Patches, share: float) -> Surfaces:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """What surfaces get from light, to compare suns with.
+    """What surfaces should get from suns.
 
     irradiance: of each surface, luminance, (s,). mean: what surfaces get in the open from the
     whole map, on average over all that they may face.
@@ -101,25 +111,32 @@ class Prediction:
     mean: float
 
     @classmethod
-    def of(cls, patches: Patches, all_light: float) -> Prediction:
-        """patches: the light that suns shall replace, one at least. all_light: luminance of the
-        whole map's scalar irradiance."""
-        flux = patches.flux @ LUMINANCE_WEIGHTS
-        surfaces = surfaces_for(patches, min(float(flux.sum()) / all_light, 1.0))
-        given = surfaces.irradiance(patches.directions, flux, half_widths(patches.spread))
-        return cls(surfaces, given, all_light / 4)
+    def of(
+        cls, patches: Patches | None, all_light: float, unshadowed: Patches | None = None
+    ) -> Prediction:
+        """patches: the light that suns shall replace. all_light: luminance of the whole map's
+        scalar irradiance. unshadowed: a residual that is shown as if nothing stood before it; then
+        the suns are asked to make up for the shadows that it lacks."""
+        given = [some for some in (patches, unshadowed) if some is not None]
+        surfaces = surfaces_for(given, all_light)
+        wanted = np.zeros(SURFACES)
+        for some in given:
+            wanted += surfaces.of(some)
+        if unshadowed is not None:
+            wanted -= surfaces.in_the_open().of(unshadowed)
+        return cls(surfaces, wanted, all_light / 4)
 
     def error(self, suns: Sequence[Sun]) -> float:
         """Root mean square of what surfaces get wrong under shadows if these suns stand in for
         the light, as a part of the mean irradiance in the open."""
-        given = self.surfaces.irradiance(*_pieces(suns))
+        given = self.surfaces.irradiance(*_pieces(suns)) if len(suns) else 0.0
         return float(np.sqrt(np.mean((given - self.irradiance) ** 2))) / self.mean
 
 
 def _pieces(suns: Sequence[Sun]) -> tuple[Floats, Floats, Floats]:
     """Each sun, one at least, as points in a spiral over its disc: directions, luminous light and
     half widths."""
-    count = int(np.clip(PIECES // max(len(suns), 1), 64, 2048))
+    count = int(np.clip(PIECES // max(len(suns), 1), 32, 1024))
     found = []
     for sun in suns:
         light = float(sun.scalar_irradiance @ LUMINANCE_WEIGHTS)

@@ -10,14 +10,11 @@ from numpy.typing import NDArray
 
 from . import sphere
 from .environment import LUMINANCE_WEIGHTS, EnvironmentMap
-from .settings import ConversionSettings, Fill
+from .settings import Fill
 from .strata import Strata
 from .surroundings import surroundings
 
 Floats = NDArray[np.float64]
-
-SMALLEST_SUN = 0.005
-"""Part of all light below which the automatic choice makes no sun: nobody would see its shadow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,46 +69,3 @@ def light_of_region_a(environment: EnvironmentMap, strata: Strata, fill: Fill) -
         radiance -= surroundings(environment.radiance, region)
     solid = sphere.row_solid_angles(width, height)
     return RegionLight(pixels, radiance * solid[pixels // width, None], width, height)
-
-
-def light_for_suns(
-    environment: EnvironmentMap, strata: Strata, settings: ConversionSettings
-) -> tuple[RegionLight, tuple[str, ...]]:
-    """The light that suns replace, and what the user should know of light that they do not.
-
-    It is all of region A, but where the program chooses the share and whole lights: then specks,
-    and what exceeds the number of lights, stay in the residual, where nothing is lost.
-    """
-    light = light_of_region_a(environment, strata, settings.filled)
-    if settings.method != "edge" or settings.share is not None or not len(light.pixels):
-        return light, ()
-    return _whole_lights(light, strata, settings.most_lights)
-
-
-def _whole_lights(
-    light: RegionLight, strata: Strata, most: int
-) -> tuple[RegionLight, tuple[str, ...]]:
-    """The light of the `most` brightest connected groups of region A, rims included."""
-    labels, count = sphere.connected_groups(strata.region_a)
-    if len(light.pixels) > np.count_nonzero(labels):
-        labels = sphere.grow_groups(labels, strata.luminance)
-    owner = labels.ravel()[light.pixels] - 1
-    flux = np.bincount(owner, light.luminous_flux, count) / strata.light
-    order = np.argsort(-flux, kind="stable")
-    seen = np.count_nonzero(flux >= SMALLEST_SUN)
-    kept = np.zeros(count, bool)
-    kept[order[: min(seen, most)]] = True
-    notes = (
-        *_left_out(flux[order[seen:]], f"each below {SMALLEST_SUN:.1%}"),
-        *_left_out(flux[order[:seen][most:]], f"beyond the limit of {most} lights"),
-    )
-    return light.part(kept[owner]), notes
-
-
-def _left_out(flux: Floats, why: str) -> list[str]:
-    """A sentence about groups that hold these parts of all light."""
-    flux = flux[flux > 0]
-    if not len(flux):
-        return []
-    spots = "1 bright spot" if len(flux) == 1 else f"{len(flux)} bright spots"
-    return [f"{spots} with {flux.sum():.2%} of all light stay in the residual: {why}."]

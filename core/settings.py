@@ -14,6 +14,7 @@ Frequency = Literal["one", "energy", "mean"]
 """F of the paper: 1; the integral of L over the sample's cell; that by the cell's area."""
 ResidualKind = Literal["map", "voronoi", "none"]
 Fill = Literal["surroundings", "black"]
+Target = Literal["cycles", "eevee", "export"]
 
 MOST = {"lights": 10_000, "samples": 50_000, "residual_samples": 20_000}
 """The largest numbers, for which every method is done in a minute or so on a map 1024 wide."""
@@ -38,6 +39,9 @@ class BadSetting(SunsplitError):
 class ConversionSettings:
     """How to split a map.
 
+    target: what the result is for. "cycles" shows the residual with its shadows; "eevee" and
+        "export" (game engines) light with it from everywhere, so that more of the map becomes
+        suns, and what is predicted counts the shadows that the residual lacks.
     lights: at most so many suns, used up where they help, or None: as few as `tolerance` allows.
     tolerance: predicted error in percent of the mean irradiance (see `prediction`), at which no
         more lights are added; None: 1, and a twentieth of what the suns give, where `lights` is
@@ -63,6 +67,7 @@ class ConversionSettings:
         with the method "edge", black with the others.
     """
 
+    target: Target = "cycles"
     lights: int | None = None
     tolerance: float | None = None
     share: float | None = None
@@ -97,6 +102,16 @@ class ConversionSettings:
                 raise BadSetting(f'{name} must be {options}, not "{value}".')
 
     @property
+    def shadowed_residual(self) -> bool:
+        """Whether the target shows the residual with its shadows."""
+        return self.target == "cycles"
+
+    @property
+    def takes_whole_lights(self) -> bool:
+        """Whether specks of region A, and more lights than are allowed, stay in the residual."""
+        return self.method == "edge" and self.share is None and self.shadowed_residual
+
+    @property
     def leaves_residual(self) -> bool:
         """Whether there is a rest to show: not if all light goes to suns."""
         return self.residual != "none" and self.share != 1
@@ -123,6 +138,7 @@ class ConversionSettings:
 
 
 _CHOICES = {
+    "target": get_args(Target),
     "method": get_args(Method),
     "shape": get_args(Shape),
     "position": get_args(Position),

@@ -47,6 +47,13 @@ class Strata:
         return float(self.luminance.sum(axis=1) @ sphere.row_solid_angles(width, height))
 
     @property
+    def square(self) -> float:
+        """4 pi (integral of luminance squared) / light^2; 1 for a constant map."""
+        height, width = self.luminance.shape
+        integral = (self.luminance**2).sum(axis=1) @ sphere.row_solid_angles(width, height)
+        return float(4 * np.pi * integral / self.light**2)
+
+    @property
     def threshold(self) -> float:
         """Luminance above which a pixel belongs to region A."""
         return float(self.bounds[len(self.bounds) // 2])

@@ -15,13 +15,22 @@ from .placement import NO_SUN, ChosenSuns
 from .sampled import sampled_suns
 
 
-def choose_suns(light: RegionLight, strata: Strata, settings: ConversionSettings) -> ChosenSuns:
-    """Suns that hold all of the light, and what shadows are predicted to be wrong by."""
+def choose_suns(
+    light: RegionLight,
+    strata: Strata,
+    settings: ConversionSettings,
+    unshadowed: RegionLight | None = None,
+) -> ChosenSuns:
+    """Suns that hold all of the light, and what shadows are predicted to be wrong by.
+
+    unshadowed: the rest of the map, where the target shows it without shadows.
+    """
     light = light.part(light.luminous_flux > 0)
     if not len(light.pixels):
         return ChosenSuns((), 0.0, (NO_SUN,) if settings.share is None else ())
     patches = patches_of(light, strata.luminance.ravel()[light.pixels])
-    prediction = Prediction.of(patches, strata.light)
+    rest = patches_of(unshadowed, unshadowed.luminous_flux) if unshadowed else None
+    prediction = Prediction.of(patches, strata.light, rest)
 
     def with_lights(count: int) -> ChosenSuns:
         if settings.method == "edge":

@@ -47,6 +47,10 @@ class Occluders:
     axes: Floats
     cosines: Floats
 
+    def without_occluders(self) -> Occluders:
+        """The same surfaces in the open."""
+        return Occluders(self.normals, self.axes, np.full_like(self.cosines, NEVER))
+
     def irradiance(self, directions: Floats, flux: Floats) -> Floats:
         """Of each surface, (s, c), from lights of no width: directions (n, 3), flux (n, c)."""
         total = np.zeros((len(self.normals), flux.shape[1]))

@@ -1,0 +1,104 @@
+"""Which bright spots become suns where the program chooses: those that would make noise.
+
+Cycles shows what stays in the residual with its shadows, so nothing is lost there; but a bright
+speck that only chance hits is noise. A path tracer that samples by surfaces has, for a residual of
+luminance R and a map with all light F, the relative variance 4 pi (integral of R^2) / F^2 less the
+square of what R adds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import sphere
+from .placement.choice import choose_suns
+from .placement.placement import ChosenSuns
+from .region import RegionLight
+from .settings import TOLERANCE, ConversionSettings
+from .strata import Strata
+
+Floats = NDArray[np.float64]
+
+AS_CALM = 1.25
+"""So much more variance than without any spot is not worth a sun."""
+
+CALM = 0.05
+"""Nor is a variance, in all, that 20 samples bring below 5 %."""
+
+
+@dataclass(frozen=True, eq=False)
+class WholeLights:
+    """The connected groups of region A, the brightest first.
+
+    light: of all of them, rims included. rank: of each of its pixels' group, (p,). flux: luminous,
+    of each group as a part of all light, (g,). variance: of the residual with the first 0, 1, ...
+    g groups taken out, (g + 1,).
+    """
+
+    light: RegionLight
+    rank: NDArray[np.intp]
+    flux: Floats
+    variance: Floats
+
+    @property
+    def noisy(self) -> int:
+        """How many of the brightest must be taken out, so that the residual is calm."""
+        allowed = max(AS_CALM * self.variance[-1], self.variance[-1] + CALM)
+        return int(np.argmax(self.variance <= allowed))
+
+    def brightest(self, count: int) -> RegionLight:
+        return self.light.part(self.rank < count)
+
+    def note(self, count: int, why: str) -> tuple[str, ...]:
+        """A sentence about those that are not among the brightest `count`."""
+        left = self.flux[count:]
+        left = left[left > 0]
+        if not len(left):
+            return ()
+        spots = "1 bright spot" if len(left) == 1 else f"{len(left)} bright spots"
+        return (f"{spots} with {left.sum():.2%} of all light stay in the residual: {why}.",)
+
+
+def suns_for_whole_lights(
+    light: RegionLight, strata: Strata, settings: ConversionSettings
+) -> tuple[RegionLight, ChosenSuns, tuple[str, ...]]:
+    """The light that suns replace, those suns, and what the user should know of the rest.
+
+    Where as many suns as were asked for stand for it only badly, half of the spots at a time are
+    left in the residual, down to one for each sun.
+    """
+    groups = whole_lights(light, strata)
+    count, why = groups.noisy, "too faint to make noise"
+    while True:
+        chosen = choose_suns(groups.brightest(count), strata, settings)
+        lights = settings.most_lights
+        if count <= lights or chosen.predicted_error <= (settings.tolerance or TOLERANCE) / 100:
+            return groups.brightest(count), chosen, groups.note(count, why)
+        count, why = max(count // 2, lights), f"beyond the limit of {lights} lights"
+
+
+def whole_lights(light: RegionLight, strata: Strata) -> WholeLights:
+    """Group the light of region A."""
+    labels, count = sphere.connected_groups(strata.region_a)
+    if len(light.pixels) > np.count_nonzero(labels):
+        labels = sphere.grow_groups(labels, strata.luminance)
+    owner = labels.ravel()[light.pixels] - 1
+    flux = np.bincount(owner, light.luminous_flux, count) / strata.light
+    order = np.argsort(-flux, kind="stable")
+    rank = np.empty(count, np.intp)
+    rank[order] = np.arange(count)
+    squares = np.bincount(owner, _squares_taken(light, strata), count)[order]
+    left = 1 - np.concatenate([[0], np.cumsum(flux[order])])
+    variance = strata.square - np.concatenate([[0], np.cumsum(squares)]) - left**2
+    return WholeLights(light, rank[owner], flux[order], variance)
+
+
+def _squares_taken(light: RegionLight, strata: Strata) -> Floats:
+    """What each pixel takes from 4 pi (integral of R^2) / F^2 if its light is taken out, (p,)."""
+    solid = sphere.row_solid_angles(light.width, light.height)[light.pixels // light.width]
+    before = strata.luminance.ravel()[light.pixels]
+    after = np.maximum(before - light.luminous_flux / solid, 0)
+    return 4 * np.pi * solid * (before**2 - after**2) / strata.light**2
