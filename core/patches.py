@@ -24,6 +24,10 @@ same errors in twice the time (docs/benchmarks/lights.md)."""
 LARGEST_BLOCK = 16
 """Pixels along the side of the largest block, a power of two: 6 degrees of a map 1024 wide."""
 
+IN_FOUR = 0.01
+"""Part of a light above which a pixel counts as four patches: a square sun's corners are the last
+thing that one disc gets wrong. Half a pixel is as narrow as a disc may be."""
+
 _SUMS = 7
 """What is summed over blocks: flux (3), luminous flux, luminous flux times direction (3)."""
 
@@ -47,7 +51,7 @@ class Patches:
 
 
 def patches_of(light: RegionLight, brightness: Floats, most: int = MOST_PATCHES) -> Patches:
-    """Patches of a light, about `most` of them and no more, or its pixels where they are fewer.
+    """Patches of a light: about `most` of them, or its pixels where they are fewer.
 
     brightness: of each pixel of the light, (p,), at least 0. Only pixels that shine count. Blocks
     with much light, squared and times their width, are divided first: by so much a shadow's edge
@@ -71,22 +75,42 @@ def patches_of(light: RegionLight, brightness: Floats, most: int = MOST_PATCHES)
     rows, columns = np.divmod(light.pixels, light.width)
     single = whole[rows, columns]
     found.append(_pixels(light.part(single), brightness[single]))
-    return Patches(
-        *(
-            np.concatenate([getattr(part, name) for part in found])
-            for name in ("directions", "flux", "spread", "brightness")
-        )
-    )
+    return _joined(found)
+
+
+def _joined(parts: list[Patches]) -> Patches:
+    names = ("directions", "flux", "spread", "brightness")
+    return Patches(*(np.concatenate([getattr(one, name) for one in parts]) for name in names))
 
 
 def _pixels(light: RegionLight, brightness: Floats) -> Patches:
+    """Each pixel as a patch, or as four where it holds much of the light."""
     size = light.width, light.height
-    return Patches(
-        sphere.pixel_directions(light.pixels, *size),
-        light.flux,
-        sphere.pixel_spread(light.pixels, *size),
-        brightness,
-    )
+    four = light.luminous_flux > IN_FOUR * light.luminous_flux.sum()
+    single, several = light.part(~four), light.part(four)
+    found = [
+        Patches(
+            sphere.pixel_directions(single.pixels, *size),
+            single.flux,
+            sphere.pixel_spread(single.pixels, *size),
+            brightness[~four],
+        )
+    ]
+    finer = 2 * light.width, 2 * light.height
+    rows, columns = np.divmod(several.pixels, light.width)
+    solid, fine = sphere.row_solid_angles(*size)[rows], sphere.row_solid_angles(*finer)
+    for down, right in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        row = 2 * rows + down
+        pixels = row * finer[0] + 2 * columns + right
+        found.append(
+            Patches(
+                sphere.pixel_directions(pixels, *finer),
+                several.flux * (fine[row] / solid)[:, None],
+                sphere.pixel_spread(pixels, *finer),
+                brightness[four],
+            )
+        )
+    return _joined(found)
 
 
 def _limit(badness: list[Floats], most: int) -> float:

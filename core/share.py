@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from . import sphere
 from .environment import EnvironmentMap
 from .patches import patches_of
 from .placement.edge import edge_suns
@@ -18,9 +19,9 @@ from .region import RegionLight, light_of_map
 from .settings import ConversionSettings
 from .strata import Strata, stratify
 
-SHARES = (1.0, 0.95, 0.9, 0.8, 0.65, 0.5, 0.3, None)
-"""What is tried, in this order, and at last whole peaks with their halo. Between two of them the
-error is flat; after two that are worse than the best, so are the rest."""
+SHARES = (1.0, 0.95, 0.9, 0.8, 0.65, 0.5, 0.3)
+"""What is tried, in this order, after whole peaks with their halo. Between two of them the error is
+flat; once it has risen twice, it goes on rising."""
 
 MOST_OF_A_WORLD = 0.95
 """Where the residual is a scene's world: mirrors must have something to show."""
@@ -37,17 +38,18 @@ def choose_strata(environment: EnvironmentMap, settings: ConversionSettings) -> 
     if settings.share is not None or settings.shadowed_residual:
         return stratify(environment, settings.share, settings.strata)
     whole = light_of_map(environment.radiance)
-    best, least, worse = None, np.inf, 0
+    best = stratify(environment, None, settings.strata)
+    least, before, rises = _error(whole, best, settings), np.inf, 0
     for share in SHARES:
-        if share and share > MOST_OF_A_WORLD and settings.target == "eevee":
+        if share > MOST_OF_A_WORLD and settings.target == "eevee":
             continue
         strata = stratify(environment, share, settings.strata)
         error = _error(whole, strata, settings)
         if error < least:
-            best, least, worse = strata, error, 0
-        else:
-            worse += 1
-        if worse == 2:
+            best, least = strata, error
+        rises = rises + 1 if error > before else 0
+        before = error
+        if rises == 2:
             break
     return best
 
@@ -65,11 +67,14 @@ def _error(whole: RegionLight, strata: Strata, settings: ConversionSettings) -> 
 
 
 def _parted(whole: RegionLight, strata: Strata) -> tuple[RegionLight, RegionLight]:
-    """What exceeds the border of region A, about what suns get, and all the rest."""
-    luminance = strata.luminance.ravel()
-    excess = np.maximum(1 - strata.threshold / np.maximum(luminance, 1e-300), 0)
-    if strata.threshold < 0:
-        excess = np.ones_like(luminance)
+    """About what suns get, and all the rest: what exceeds the mean along region A's border."""
+    luminance, region = strata.luminance.ravel(), strata.region_a
+    inside = np.flatnonzero(region)
+    near = sphere.neighbours(inside, whole.width, whole.height).ravel()
+    border = near[~region.ravel()[near]]
+    level = luminance[border].mean() if len(border) else 0.0
+    excess = np.where(region.ravel(), 1 - level / np.maximum(luminance, 1e-300), 0.0)
+    excess = np.maximum(excess, 0)
     size = whole.width, whole.height
     bright = RegionLight(whole.pixels, whole.flux * excess[:, None], *size)
     dark = RegionLight(whole.pixels, whole.flux * (1 - excess)[:, None], *size)

@@ -44,8 +44,9 @@ TOGETHER = 7.0
 against how much it is drawn to the nearest cell. Between 5 and 10 the worst channel's error falls
 by 3 % against luminance's, while the latter grows by 5 %."""
 
-STEPS = 8
-"""How often borders are shared out: three quarters of what can be won comes with the first two."""
+STEPS = 16
+"""How often borders are shared out: three quarters of what can be won comes with the first two,
+and after 20 the error of 256 lights falls by one part in a hundred."""
 
 HEAVY = 0.1
 """A patch with more than this part of its cell's light stays there: from hand to hand it would
@@ -158,12 +159,12 @@ class _Light:
 
     @cached_property
     def features(self) -> Floats:
-        """What distances of patches are linear in, (p, 12): direction and 1, both once more times
-        red and times blue against all of the patch's light."""
+        """What distances of patches are linear in, (p, 10): direction, 1, and direction once more
+        times red and times blue against all of the patch's light."""
         whole = np.maximum(self.light, 1e-300)[:, None]
         parts = [self.patches.directions, np.ones_like(whole)]
-        for channel, vector in self.weighted.items():
-            parts += [vector / whole, self.relative[:, channel, None] / whole]
+        for vector in self.weighted.values():
+            parts.append(vector / whole)
         return np.concatenate(parts, axis=1)
 
     @cached_property
@@ -231,9 +232,9 @@ class _Light:
         of_cells = [-2 * cells.to_light * scale[:, None], 2 * scale[:, None]]
         for channel in (0, 2):
             vector = _sums(cells.owner, self.weighted[channel], count)
-            aside = vector - of_cell[:, channel, None] * cells.to_light
+            aside = vector - (vector * cells.to_light).sum(axis=1)[:, None] * cells.to_light
             aside *= (TOGETHER * scale / np.maximum(whole, 1e-300))[:, None]
-            of_cells += [aside, -(aside * cells.to_light).sum(axis=1)[:, None]]
+            of_cells.append(aside)
         distance = self.features @ np.concatenate(of_cells, axis=1).T
         owner = np.argmin(distance, axis=1)
         stays = self.light > HEAVY * whole[cells.owner]
@@ -255,14 +256,15 @@ def _moments(
 ) -> tuple[Floats, Floats]:
     """Mean directions (n, 3) and shortfalls (n,) of cells; see `PatchCells`."""
     total = np.bincount(owner, weight, count)
-    vector = _sums(owner, weight[:, None] * directions, count)
+    # Each patch is as long as the mean of what it holds: sums are as over its pixels.
+    vector = _sums(owner, (weight * (1 - spread))[:, None] * directions, count)
     length = np.linalg.norm(vector, axis=1)
     lost = length <= 1e-9 * total  # light from all sides
     to_light = vector / np.where(lost, 1, length)[:, None]
     for cell in np.flatnonzero(lost):
         mine = np.flatnonzero(owner == cell)
         to_light[cell] = directions[mine[np.argmax(weight[mine])]]
-    apart = ((directions - to_light[owner]) ** 2).sum(axis=1) / 2 + spread
+    apart = (1 - spread) * ((directions - to_light[owner]) ** 2).sum(axis=1) / 2 + spread
     return to_light, np.bincount(owner, weight * apart, count) / total
 
 

@@ -27,12 +27,14 @@ NEVER = 2.0
 AT_ONCE = 4096
 """Directions that are looked at together: what fits into a processor's cache."""
 
-FINE_FLUX = ((1e-4, 16), (1e-5, 4))
+FINE_FLUX = ((1e-2, 64), (1e-3, 32), (1e-4, 16), (1e-5, 4))
 """A pixel with more than this part of all light counts as so many pieces along either side: as
-one point it would be hidden or not, which is an error of its own."""
+one point it would be hidden or not, and as 16 by 16 an edge along a row would still hide a
+sixteenth at once, which is an error of the judge and not of the lights."""
 
-POINTS = 1 << 15
-"""Directions that stand for all discs together; each gets 256 at least."""
+POINTS = 1 << 16
+"""Directions that stand for all discs together, in proportion to their light; each gets 128 at
+least and 16,384 at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +53,11 @@ class Occluders:
         """The same surfaces in the open."""
         return Occluders(self.normals, self.axes, np.full_like(self.cosines, NEVER))
 
-    def irradiance(self, directions: Floats, flux: Floats) -> Floats:
-        """Of each surface, (s, c), from lights of no width: directions (n, 3), flux (n, c)."""
+    def irradiance(self, directions: Floats, flux: Floats, squared: bool = False) -> Floats:
+        """Of each surface, (s, c), from lights of no width: directions (n, 3), flux (n, c).
+
+        squared: with the square of the cosine.
+        """
         total = np.zeros((len(self.normals), flux.shape[1]))
         single = self.cosines[:, 1] == NEVER
         for some in (single, ~single):
@@ -67,6 +72,8 @@ class Occluders:
                 if cones > 1:
                     hidden = hidden.reshape(len(part), -1, cones).any(axis=2)
                 facing[hidden] = 0
+                if squared:
+                    facing *= facing
                 total[some] += facing.T @ flux[start : start + AT_ONCE]
         return total
 
@@ -133,16 +140,17 @@ def light_of(environment: EnvironmentMap) -> tuple[Floats, Floats]:
 
 def light_of_suns(suns: tuple[Sun, ...]) -> tuple[Floats, Floats]:
     """Suns as directions (n, 3) and scalar irradiances (n, 3); a disc as many directions."""
-    discs = sum(sun.angular_diameter > 0 for sun in suns)
-    count = max(256, POINTS // max(discs, 1))
-    index = np.arange(count) + 0.5
-    turn = index * (np.pi * (3 - np.sqrt(5)))  # a sunflower
+    light = sum(sun.scalar_irradiance for sun in suns) @ LUMINANCE_WEIGHTS
     directions, flux = [], []
     for sun in suns:
         if sun.angular_diameter == 0:
             directions.append(sun.to_light[None])
             flux.append(sun.irradiance[None])
             continue
+        part = float(sun.scalar_irradiance @ LUMINANCE_WEIGHTS / light)
+        count = int(np.clip(POINTS * part, 128, 16_384))
+        index = np.arange(count) + 0.5
+        turn = index * (np.pi * (3 - np.sqrt(5)))  # a sunflower
         first, second = sphere.tangents(sun.to_light)
         along = 1 - index / count * 2 * np.sin(sun.angular_diameter / 4) ** 2
         aside = np.sqrt(1 - along**2)

@@ -1,0 +1,78 @@
+"""The share that the program chooses, for each target."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sunsplit.core import ConversionSettings, convert, load
+from sunsplit.core.sampling import contrast
+from tests.maps import direction, environment, paint_disc, sky
+
+
+def test_a_budget_for_export_gets_more_of_the_map_than_cycles(sunrise):
+    found = load(sunrise)
+    cycles, export = (
+        convert(found, ConversionSettings(target=target, lights=16))
+        for target in ("cycles", "export")
+    )
+    assert export.account.share > cycles.account.share + 0.1
+
+
+def test_export_counts_the_shadows_that_its_residual_lacks(sunrise):
+    found = load(sunrise)
+    fixed = {"share": 0.5, "lights": 8}
+    cycles = convert(found, ConversionSettings(target="cycles", **fixed))
+    export = convert(found, ConversionSettings(target="export", **fixed))
+    assert len(export.suns) == len(cycles.suns)
+    assert export.predicted_error > 5 * cycles.predicted_error
+
+
+def test_one_light_for_export_is_the_sun_and_not_all_of_the_sky():
+    pixels = sky(128, 0.3)
+    paint_disc(pixels, direction(30, 30), 4, (400, 400, 400))
+    found = environment(pixels)
+    conversion = convert(found, ConversionSettings(target="export", lights=1))
+    assert conversion.residual is not None
+    assert np.degrees(conversion.suns[0].angular_diameter) < 12
+    whole = convert(found, ConversionSettings(target="export", lights=1, share=1))
+    assert conversion.predicted_error < whole.predicted_error
+
+
+def test_eevee_keeps_a_world_for_mirrors(sunrise):
+    conversion = convert(load(sunrise), ConversionSettings(target="eevee", lights=64))
+    assert conversion.residual is not None
+    assert conversion.residual.max() > 0
+
+
+def glittering() -> np.ndarray:
+    """A sun, and 60 sparks each a four-hundredth as strong."""
+    pixels = sky(256, 0.1)
+    paint_disc(pixels, direction(30, 40), 3, (2000, 2000, 2000))
+    random = np.random.default_rng(5)
+    pixels[random.integers(40, 90, 60), random.integers(0, 256, 60)] = 1500
+    return pixels
+
+
+def test_specks_that_make_noise_become_suns():
+    conversion = convert(environment(glittering()), ConversionSettings(lights=40))
+    moment, _ = contrast(conversion.residual)
+    assert moment < 3
+    assert len(conversion.suns) <= 40
+
+
+def test_specks_that_few_lights_cannot_stand_for_stay(sunrise):
+    conversion = convert(environment(glittering()), ConversionSettings(lights=2))
+    assert len(conversion.suns) == 2
+    assert conversion.predicted_error < 0.01
+    assert "beyond the limit of 2 lights" in " ".join(conversion.notes)
+
+
+def test_a_speck_that_makes_no_noise_stays():
+    pixels = sky(256, 0.3)
+    paint_disc(pixels, direction(30, 40), 3, (2000, 2000, 2000))
+    pixels[64, 10] = 20
+    conversion = convert(environment(pixels))
+    assert len(conversion.suns) == 1
+    assert conversion.residual.max() == pytest.approx(20)
+    assert "too faint to make noise" in " ".join(conversion.notes)
