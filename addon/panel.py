@@ -58,6 +58,7 @@ class SUNSPLIT_PT_settings(bpy.types.Panel):
 def draw_settings(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     """The choices of a scene or of the operator; what has no effect now is left out or grey."""
     sampled = settings.method != "edge"
+    layout.prop(settings, "target")
     layout.prop(settings, "method")
     layout.prop(settings, "lights")
     layout.prop(settings, "tolerance")

@@ -19,6 +19,21 @@ DEFAULTS = ConversionSettings()
 _FRESH: set[str] = {"SKIP_SAVE"}
 
 CHOICES = {
+    "target": EnumProperty(
+        name="Target",
+        description="What shows the result",
+        items=[
+            ("cycles", "Cycles", "The world keeps its shadows: lamps for what would make noise"),
+            (
+                "eevee",
+                "EEVEE",
+                "The world casts no shadows: with an automatic share more of it becomes lamps",
+            ),
+            ("export", "Export", "As EEVEE, and the whole map may become lamps"),
+        ],
+        default=DEFAULTS.target,
+        options=_FRESH,
+    ),
     "lights": IntProperty(
         name="Lights",
         description="At most so many sun lamps, used up where they make shadows truer; "

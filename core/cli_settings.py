@@ -15,6 +15,7 @@ from .settings import (
     Position,
     ResidualKind,
     Shape,
+    Target,
 )
 
 DEFAULTS = ConversionSettings()
@@ -31,6 +32,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
 def settings_from(options: argparse.Namespace) -> ConversionSettings:
     """What was chosen."""
     return ConversionSettings(
+        target=options.target,
         lights=options.lights,
         tolerance=options.tolerance,
         share=options.share,
@@ -95,11 +97,18 @@ def figure_settings_from(options: argparse.Namespace) -> FigureSettings:
 
 def _add_bright(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
+        "--target",
+        choices=get_args(Target),
+        default=DEFAULTS.target,
+        help="what the result is for: cycles (default) shows the rest with its shadows; eevee and "
+        "export light with it from everywhere, so that more of the map becomes suns",
+    )
+    group.add_argument(
         "--share",
         type=_share,
         metavar="X",
-        help="part of all light in the bright region, 0 (no suns) to 1 (no residual), "
-        "or auto (default): whole peaks with their halo",
+        help="part of all light in the bright region, 0 (no suns) to 1 (no residual), or auto "
+        "(default): for cycles whole peaks with their halo, else where shadows are truest",
     )
     group.add_argument(
         "--strata",

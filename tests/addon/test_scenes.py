@@ -157,7 +157,7 @@ def test_arguments_of_a_failed_conversion_are_forgotten(scene, east):
     hdri_world(scene, east).projection = "MIRROR_BALL"
     with pytest.raises(RuntimeError, match="mirror ball"):
         bpy.ops.sunsplit.convert(lights=3)
-    assert scene.sunsplit.lights == 16
+    assert scene.sunsplit.lights == 0
 
 
 def test_without_its_original_a_world_is_turned_back(scene, east):

@@ -88,15 +88,15 @@ def _exported(conversion: Conversion, occluders: Occluders, truth: np.ndarray) -
 
 
 def _suns(conversion: Conversion, occluders: Occluders) -> tuple[np.ndarray, np.ndarray]:
-    """Irradiance of all suns, and its variance if one point of one of them is asked at a time, in
-    proportion to what it would give unhidden."""
+    """Irradiance of all suns, and its variance if one of them is asked at a time, in proportion to
+    what it would give a surface that faces it: Cycles does not look which way a surface faces."""
     if not conversion.suns:
         return np.zeros(len(occluders.normals)), np.zeros(len(occluders.normals))
     directions, flux = light_of_suns(conversion.suns)
     light = (flux @ LUMINANCE_WEIGHTS)[:, None]
     seen = occluders.irradiance(directions, light)[:, 0]
-    opened = occluders.without_occluders().irradiance(directions, light)[:, 0]
-    return seen, opened * seen - seen**2
+    squared = occluders.irradiance(directions, light, squared=True)[:, 0]
+    return seen, light.sum() * squared - seen**2
 
 
 def _irradiance(occluders: Occluders, radiance: np.ndarray) -> np.ndarray:

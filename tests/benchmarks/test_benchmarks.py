@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from tests.benchmarks import methods, region_a, table1, voronoi
+from tests.benchmarks import lights, methods, region_a, shares, table1, voronoi
 
 
 def test_region_a(tmp_path, monkeypatch, sunrise):
@@ -57,3 +57,30 @@ def test_table1(tmp_path, monkeypatch, sunrise):
         assert 0 < float(row[5]) < 5
         # Every row shows the same light, noise and hard shadows aside.
         assert abs(float(row[8].rstrip("%"))) < 25
+
+
+def test_lights(tmp_path, sunrise):
+    arguments = [str(sunrise), "--setups", "60", "--seeds", "1", "2", "--lights", "1", "16"]
+    runs = lights.main([*arguments, "-o", str(tmp_path)])
+    assert len(runs) == len(lights.WAYS) * 2 * 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "lights-number.png",
+        "lights-seconds.png",
+        "lights.md",
+    ]
+    error = {(run.way, run.lights): run.luminance for run in runs if run.seed == 1}
+    assert error["edge, discs", 16] < 0.75 * error["median-cut, points", 16]
+    for run in runs:
+        assert run.made == run.lights
+        # So few surfaces tell the order of magnitude.
+        assert 0.3 < run.predicted / run.luminance < 3
+
+
+def test_shares(tmp_path, monkeypatch, sunrise):
+    monkeypatch.setattr(shares, "SHARES", (0.0, 0.5, 1.0))
+    arguments = [str(sunrise), "--setups", "30", "--lights", "4"]
+    results = shares.main([*arguments, "-o", str(tmp_path)])
+    assert len(results) == 2 * 4
+    error = {(one.target, one.share): one.error for one in results}
+    assert error["export", None] < error["export", 0.0]
+    assert error["cycles", None] < error["cycles", 0.0]

@@ -89,6 +89,7 @@ def test_json_is_one_object_and_nothing_else(sky_file, out, capfd):
         key: written[key] for key in written if key not in ("format", "version", "axes")
     }
     assert answer["settings"] | {"threshold": 0, "share": 0} == {
+        "target": "cycles",
         "lights": 1,
         "tolerance": 1.0,
         "share": 0,

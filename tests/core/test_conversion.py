@@ -194,7 +194,9 @@ def test_share_one_turns_all_light_into_suns():
     conversion = convert(found, ConversionSettings(lights=8, share=1.0, residual="none"))
     assert conversion.residual is None
     assert conversion.account.suns == pytest.approx(conversion.account.source, rel=1e-9)
-    assert len(conversion.suns) == 8
+    # Two hemispheres tile an even map: more lights are not used where they would do worse.
+    assert 2 <= len(conversion.suns) <= 8
+    assert conversion.predicted_error < 0.02
 
 
 def load_random():
