@@ -149,9 +149,9 @@ def test_a_rough_ball_in_the_real_map(tmp_path, sunrise):
     scene = fresh_scene()
     hdri_world(scene, sunrise)
     add_ball(scene, BALLS["rough metal"])
-    plain = estimate(scene, tmp_path, 128)
+    plain = estimate(scene, tmp_path, 256)
     bpy.ops.sunsplit.convert()
-    split = estimate(scene, tmp_path, 128)
+    split = estimate(scene, tmp_path, 256)
     means_agree(plain, split, tmp_path)
     pixels_agree(plain, split, tmp_path, slack=0.05)
 
