@@ -26,10 +26,11 @@ def choose_suns(
     unshadowed: the rest of the map, where the target shows it without shadows.
     """
     light = light.part(light.luminous_flux > 0)
-    if not len(light.pixels):
-        return ChosenSuns((), 0.0, (NO_SUN,) if settings.share is None else ())
-    patches = patches_of(light, strata.luminance.ravel()[light.pixels])
     rest = patches_of(unshadowed, unshadowed.luminous_flux) if unshadowed else None
+    if not len(light.pixels):
+        error = Prediction.of(None, strata.light, rest).error(()) if rest else 0.0
+        return ChosenSuns((), error, (NO_SUN,) if settings.share is None else ())
+    patches = patches_of(light, strata.luminance.ravel()[light.pixels])
     prediction = Prediction.of(patches, strata.light, rest)
 
     def with_lights(count: int) -> ChosenSuns:

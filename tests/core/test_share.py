@@ -7,6 +7,7 @@ import pytest
 
 from sunsplit.core import ConversionSettings, convert, load
 from sunsplit.core.sampling import contrast
+from sunsplit.core.tolerances import ACCOUNT
 from tests.maps import direction, environment, paint_disc, sky
 
 
@@ -26,6 +27,33 @@ def test_export_counts_the_shadows_that_its_residual_lacks(sunrise):
     export = convert(found, ConversionSettings(target="export", **fixed))
     assert len(export.suns) == len(cycles.suns)
     assert export.predicted_error > 5 * cycles.predicted_error
+
+
+def test_a_sky_without_suns_lacks_all_its_shadows_in_a_game(sunrise):
+    none = convert(load(sunrise), ConversionSettings(target="export", share=0))
+    assert none.suns == ()
+    assert none.predicted_error > 0.3
+    assert convert(load(sunrise), ConversionSettings(share=0)).predicted_error == 0
+
+
+@pytest.mark.parametrize("target", ["cycles", "eevee", "export"])
+@pytest.mark.parametrize("name", ["even", "one pixel", "one channel", "far apart", "random"])
+@pytest.mark.parametrize("lights", [None, 3])
+def test_odd_maps_for_every_target(target, name, lights):
+    pixels = {
+        "even": sky(64, 0.5),
+        "one pixel": sky(64, 0.0),
+        "one channel": sky(64, (0, 0.3, 0)),
+        "far apart": sky(64, 1e-30),
+        "random": np.random.default_rng(0).random((32, 64, 3)),
+    }[name]
+    if name in ("one pixel", "far apart"):
+        pixels[3, 3] = 1e30
+    conversion = convert(environment(pixels), ConversionSettings(target=target, lights=lights))
+    assert np.isfinite(conversion.predicted_error)
+    assert conversion.account.relative_error.max() <= ACCOUNT
+    for sun in conversion.suns:
+        assert np.isfinite([*sun.to_light, *sun.irradiance, sun.angular_diameter]).all()
 
 
 def test_one_light_for_export_is_the_sun_and_not_all_of_the_sky():
