@@ -36,6 +36,9 @@ NEAR = np.radians(10)
 PIECES = 8192
 """Points that stand for all discs together; each disc gets 32 to 1,024."""
 
+AT_ONCE = 8192
+"""Pieces of light that are held against all surfaces in memory at a time."""
+
 SHARP = 1e-7
 """Half the width of a point, radians."""
 
@@ -55,14 +58,18 @@ class Surfaces:
     def irradiance(self, directions: Floats, flux: Floats, half_width: Floats) -> Floats:
         """Of each surface, (s,), from pieces of light: directions (n, 3), luminous scalar
         irradiance (n,), half their width in radians (n,)."""
-        seen = np.cos(self.radii) - directions @ self.axes.T
-        # How far outside of the cone, in widths of the piece: at most half of one decides.
-        seen /= np.sin(self.radii)
-        seen /= 2 * half_width[:, None]
-        seen += 0.5
-        np.clip(seen, 0, 1, out=seen)
-        seen *= np.maximum(directions @ self.normals.T, 0)
-        return flux @ seen
+        total = np.zeros(len(self.radii))
+        for start in range(0, len(directions), AT_ONCE):
+            part = slice(start, start + AT_ONCE)
+            seen = np.cos(self.radii) - directions[part] @ self.axes.T
+            # How far outside of the cone, in widths of the piece: at most half of one decides.
+            seen /= np.sin(self.radii)
+            seen /= 2 * half_width[part, None]
+            seen += 0.5
+            np.clip(seen, 0, 1, out=seen)
+            seen *= np.maximum(directions[part] @ self.normals.T, 0)
+            total += flux[part] @ seen
+        return total
 
     def of(self, patches: Patches) -> Floats:
         """Of each surface, luminance, (s,)."""

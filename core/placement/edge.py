@@ -13,8 +13,8 @@ from .edge_split import PatchCells, edge_split
 from .placement import ChosenSuns
 
 NO_TRUER = 5e-5
-"""Predicted error, as a part of all light, below which more lights are not used: a twentieth of
-what any picture shows."""
+"""Predicted error, as a part of all light, below which more lights are not used: a hundredth
+of what the program allows by itself."""
 
 
 def edge_suns(

@@ -53,6 +53,10 @@ HEAVY = 0.1
 turn the widths of whole cells at each step, and never settle."""
 
 
+DISTANCES = 1 << 22
+"""Distances of patches to cells that are held in memory at a time."""
+
+
 @dataclass(frozen=True, eq=False)
 class PatchCells:
     """Cells of patches and the disc or point in the place of each.
@@ -235,8 +239,12 @@ class _Light:
             aside = vector - (vector * cells.to_light).sum(axis=1)[:, None] * cells.to_light
             aside *= (TOGETHER * scale / np.maximum(whole, 1e-300))[:, None]
             of_cells.append(aside)
-        distance = self.features @ np.concatenate(of_cells, axis=1).T
-        owner = np.argmin(distance, axis=1)
+        cell_parts = np.concatenate(of_cells, axis=1).T
+        owner = np.empty(len(self.patches), np.intp)
+        at_once = max(DISTANCES // count, 1)
+        for start in range(0, len(owner), at_once):
+            some = slice(start, start + at_once)
+            owner[some] = np.argmin(self.features[some] @ cell_parts, axis=1)
         stays = self.light > HEAVY * whole[cells.owner]
         owner[stays] = cells.owner[stays]
         return owner

@@ -8,7 +8,7 @@ from math import ceil, log
 from .placement import ChosenSuns
 
 FALL = 1.1
-"""The error falls about as the number of lights to this power (docs/benchmarks/lights.md): a first
+"""The error falls about as the number of lights to this power, see docs/benchmarks/lights: a first
 guess, so that few numbers must be tried."""
 
 
