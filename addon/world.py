@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..core.conversion import Conversion
 from ..core.environment import EnvironmentMap, environment_from_pixels
 from ..core.errors import CannotWrite, UnusableInput
-from ..core.sampling import choose_sampling
+from ..core.sampling import WorldSampling, choose_sampling
 from .mapping import map_from_world
 from .trace import TAG, Place, lighting_textures
 
@@ -146,7 +146,7 @@ def converted_world(
         # Between cells nothing is to be blended: a Voronoi map has edges.
         closest = conversion.settings.residual == "voronoi"
         _insert_residual(tree, texture, image, "Closest" if closest else texture.interpolation)
-        _set_sampling(new, residual, closest)
+        _set_sampling(new, choose_sampling(residual, conversion.account.share, closest))
     except BaseException:  # whatever it is, it goes on; only the half-made copy goes away
         remove_converted(new)
         raise
@@ -214,13 +214,10 @@ def _texture_like(
     return rest
 
 
-def _set_sampling(
-    world: bpy.types.World, residual: NDArray[np.float32] | None, cells: bool
-) -> None:
+def _set_sampling(world: bpy.types.World, sampling: WorldSampling) -> None:
     """Cycles' world importance sampling; nothing to do where Cycles is switched off."""
     if not hasattr(world, "cycles"):
         return
-    sampling = choose_sampling(residual, cells)
     world.cycles.sampling_method = sampling.method
     if sampling.method == "MANUAL":
         world.cycles.sample_map_resolution = sampling.resolution

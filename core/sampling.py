@@ -11,10 +11,14 @@ from numpy.typing import NDArray
 from .environment import luminance
 from .sphere import row_solid_angles
 
-CALM_ENOUGH = 2.5
-"""Second moment of a residual, mean(L^2) / mean(L)^2 over the sphere, up to which sampling by
-surfaces alone costs no more than a table; this and the next bounds by docs/benchmarks/region_a.md.
-"""
+CALM_ENOUGH = 0.5
+"""Variance of a sample, in squares of the mean irradiance of suns and residual, up to which
+sampling the residual by surfaces alone costs no more than a table; this and the next bounds by
+docs/benchmarks/region_a.md."""
+
+EVEN = 1.2
+"""Mean square of the irradiance of calm maps, in squares of the mean: 1 for a constant map, 2.67
+for a single light. What surfaces add of noise is the second moment less this (see `noise`)."""
 
 CALM_PEAK = 1000.0
 """Brightest pixel in means of the residual up to which a small table misses nothing that counts."""
@@ -34,20 +38,23 @@ class WorldSampling:
     resolution: int = SMALL_TABLE
 
 
-def choose_sampling(residual: NDArray[np.float32] | None, cells: bool = False) -> WorldSampling:
+def choose_sampling(
+    residual: NDArray[np.float32] | None, share: float, cells: bool = False
+) -> WorldSampling:
     """None or a small table where the residual is calm, Cycles' own large one where it is not.
 
+    share: of all light that suns give: what little the residual holds adds little noise.
     cells: of a Voronoi map, the table is as wide as the map: a smaller one blends what edges part,
     Cycles' own takes three times as long for the same picture (docs/benchmarks/table1.md).
     """
     if residual is None:
         return WorldSampling("NONE")
     moment, peak = contrast(residual)
-    if cells and moment > CALM_ENOUGH:
+    if (moment - EVEN) * (1 - share) ** 2 <= CALM_ENOUGH:
+        return WorldSampling("NONE")
+    if cells:
         return WorldSampling("MANUAL", min(residual.shape[1], WIDEST_TABLE))
-    if peak > CALM_PEAK:
-        return WorldSampling("AUTOMATIC")
-    return WorldSampling("NONE" if moment <= CALM_ENOUGH else "MANUAL")
+    return WorldSampling("AUTOMATIC" if peak > CALM_PEAK else "MANUAL")
 
 
 def contrast(radiance: NDArray[np.float32]) -> tuple[float, float]:

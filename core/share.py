@@ -1,9 +1,9 @@
 """How much of a map becomes suns where the user leaves that to the program.
 
-Cycles shows the residual with its shadows: there the share is what makes the residual calm (see
-`strata.calm_threshold`). EEVEE and game engines light with it from everywhere at once, whatever
-stands in the way: there more of the map in suns means truer shadows, until too few suns stand for
-too much.
+Cycles shows the residual with its shadows: there the border is put where least noise is left (see
+`noise`), and higher where too few suns would stand for too much. EEVEE and game engines light with
+the residual from everywhere at once, whatever stands in the way: there more of the map in suns
+means truer shadows, until too few suns stand for too much.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ from __future__ import annotations
 import numpy as np
 
 from . import sphere
-from .environment import EnvironmentMap
+from .environment import EnvironmentMap, luminance
+from .noise import PER_OCTAVE, borders, squared_noise
 from .patches import patches_of
 from .placement.edge import edge_suns
 from .prediction import Prediction
 from .region import RegionLight, light_of_map
 from .settings import ConversionSettings
-from .strata import Strata, stratify
+from .strata import Strata, stratify, stratify_at
 
 SHARES = (1.0, 0.95, 0.9, 0.8, 0.65, 0.5, 0.3)
 """What is tried, in this order, after whole peaks with their halo. Between two of them the error is
@@ -35,8 +36,34 @@ USUAL_LIGHTS = 16
 
 def choose_strata(environment: EnvironmentMap, settings: ConversionSettings) -> Strata:
     """The strata for a share that is given or chosen for the map, the lights and the target."""
-    if settings.share is not None or settings.shadowed_residual:
+    if settings.share is not None:
         return stratify(environment, settings.share, settings.strata)
+    if not settings.shadowed_residual:
+        return _truest(environment, settings)
+    if settings.lights is not None:
+        return _calmest(environment, settings)
+    return stratify(environment, None, settings.strata)
+
+
+def _calmest(environment: EnvironmentMap, settings: ConversionSettings) -> Strata:
+    """From the border of least noise upwards, as long as noise and wrong shadows become less."""
+    whole = light_of_map(environment.radiance)
+    lum = luminance(environment.radiance)
+    found = borders(lum, sphere.row_solid_angles(whole.width, whole.height))
+    best, least = stratify_at(lum, found.best_level, settings.strata), np.inf
+    for k in range(found.best, 0, -PER_OCTAVE):
+        strata = stratify_at(lum, float(found.level[k]), settings.strata)
+        wrong = _error(whole, strata, settings) ** 2
+        noise = squared_noise(found.variance[k])
+        if wrong + noise < least:
+            best, least = strata, wrong + noise
+        if noise > least or wrong < noise / 10:
+            break
+    return best
+
+
+def _truest(environment: EnvironmentMap, settings: ConversionSettings) -> Strata:
+    """The share of least predicted error, where the rest of the map is seen from everywhere."""
     whole = light_of_map(environment.radiance)
     best = stratify(environment, None, settings.strata)
     least, before, rises = _error(whole, best, settings), np.inf, 0
@@ -55,15 +82,16 @@ def choose_strata(environment: EnvironmentMap, settings: ConversionSettings) -> 
 
 
 def _error(whole: RegionLight, strata: Strata, settings: ConversionSettings) -> float:
-    """Predicted, with the rest of the map seen from everywhere."""
+    """Predicted, for as many suns as are allowed."""
     bright, dark = (
         patches_of(part, part.luminous_flux, ROUGH) if len(part.pixels) else None
         for part in _parted(whole, strata)
     )
+    unshadowed = None if settings.shadowed_residual else dark
     if bright is None:
-        return Prediction.of(None, strata.light, dark).error(())
+        return Prediction.of(None, strata.light, unshadowed).error(()) if unshadowed else 0.0
     suns = edge_suns(bright, strata, settings, settings.lights or USUAL_LIGHTS).suns
-    return Prediction.of(bright, strata.light, dark).error(suns)
+    return Prediction.of(bright, strata.light, unshadowed).error(suns)
 
 
 def _parted(whole: RegionLight, strata: Strata) -> tuple[RegionLight, RegionLight]:

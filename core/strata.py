@@ -13,14 +13,7 @@ from numpy.typing import NDArray
 
 from . import sphere
 from .environment import EnvironmentMap, luminance
-
-CALM = 30.0
-"""A calm map's brightest pixel, in means of that map. Above it, light is worth a lamp.
-
-Measured with Cycles (docs/benchmarks/region_a.md): above 30, noise stays in the map; below it,
-lamps gather halo and grow, and their penumbrae with them.
-"""
-
+from .noise import borders
 
 @dataclass(frozen=True, eq=False)
 class Strata:
@@ -71,38 +64,28 @@ class Strata:
 def stratify(environment: EnvironmentMap, share: float | None, count: int) -> Strata:
     """Cut a map into `count` strata so that region A holds `share` of its light.
 
-    share: 0 (no region A) to 1, or None for the smallest share that takes whole peaks with their
-        halo.
+    share: 0 (no region A) to 1, or None for the share that leaves a path tracer the least noise
+        (see `noise`).
     Pixels of equal luminance stay together, so the share that comes out is the nearest possible.
     """
     lum = luminance(environment.radiance)
     solid = sphere.row_solid_angles(environment.width, environment.height)
-    if share is None and count == 2:
-        threshold = calm_threshold(lum, solid)
+    if share is None:
+        return stratify_at(lum, borders(lum, solid).best_level, count)
+    return stratify_at(lum, _Levels.of(lum, solid).bound_of_share(share), count)
+
+
+def stratify_at(lum: NDArray[np.float64], threshold: float, count: int) -> Strata:
+    """Cut a map of luminance (height, width) into `count` strata, half of them above a luminance."""
+    solid = sphere.row_solid_angles(*lum.shape[::-1])
+    if count == 2:
         return Strata(lum, np.array([threshold]), 1 - _part_below(threshold, lum, solid))
     levels = _Levels.of(lum, solid)
-    threshold = calm_threshold(lum, solid) if share is None else levels.bound_of_share(share)
     below = levels.below(threshold)
     half = count // 2
     dark = [levels.bound(below * k / half) for k in range(1, half)]
     bright = [levels.bound(below + (1 - below) * k / half) for k in range(1, half)]
     return Strata(lum, np.array([*dark, threshold, *bright]), 1 - below)
-
-
-def calm_threshold(lum: NDArray[np.float64], solid: NDArray[np.float64]) -> float:
-    """The luminance at which cutting all peaks leaves a map with no pixel above CALM means.
-
-    Cutting lowers the mean, which lowers the threshold, down to a fixed point. It exists and the
-    steps to it are monotone: t -> CALM * mean(min(L, t)) rises with t and starts above it.
-    """
-    sphere_area = 4 * np.pi
-    threshold = float(lum.max())
-    for _ in range(100):
-        mean = float(np.minimum(lum, threshold).sum(axis=1) @ solid) / sphere_area
-        if CALM * mean >= threshold * (1 - 1e-9):
-            break
-        threshold = CALM * mean
-    return threshold
 
 
 def _part_below(threshold: float, lum: NDArray[np.float64], solid: NDArray[np.float64]) -> float:

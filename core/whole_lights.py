@@ -3,7 +3,7 @@
 Cycles shows what stays in the residual with its shadows, so nothing is lost there; but a bright
 speck that only chance hits is noise. A path tracer that samples by surfaces has, for a residual of
 luminance R and a map with all light F, the relative variance 4 pi (integral of R^2) / F^2 less the
-square of what R adds.
+square of what R adds (`noise` is more exact, and slower to ask for one speck after the other).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
+from .noise import OTHERWISE, squared_noise
 from .placement.choice import choose_suns
 from .placement.placement import ChosenSuns
 from .region import RegionLight
@@ -23,10 +24,7 @@ from .strata import Strata
 Floats = NDArray[np.float64]
 
 AS_CALM = 1.25
-"""So much more variance than without any spot is not worth a sun."""
-
-CALM = 0.05
-"""Nor is a variance, in all, that 20 samples bring below 5 %."""
+"""So much more variance, in all, than without any spot is not worth more suns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +44,8 @@ class WholeLights:
     @property
     def noisy(self) -> int:
         """How many of the brightest must be taken out, so that the residual is calm."""
-        allowed = max(AS_CALM * self.variance[-1], self.variance[-1] + CALM)
-        return int(np.argmax(self.variance <= allowed))
+        variance = self.variance + OTHERWISE
+        return int(np.argmax(variance <= AS_CALM * variance[-1]))
 
     def brightest(self, count: int) -> RegionLight:
         return self.light.part(self.rank < count)
@@ -68,16 +66,23 @@ def suns_for_whole_lights(
     """The light that suns replace, those suns, and what the user should know of the rest.
 
     Where as many suns as were asked for stand for it only badly, half of the spots at a time are
-    left in the residual, down to one for each sun.
+    left in the residual, down to one for each sun, if noise is the lesser evil.
     """
     groups = whole_lights(light, strata)
-    count, why = groups.noisy, "too faint to make noise"
+    count, lights, least = groups.noisy, settings.most_lights, np.inf
     while True:
         chosen = choose_suns(groups.brightest(count), strata, settings)
-        lights = settings.most_lights
+        evil = chosen.predicted_error**2 + squared_noise(groups.variance[count] + OTHERWISE)
+        if evil < least:
+            best, least = (count, chosen), evil
         if count <= lights or chosen.predicted_error <= (settings.tolerance or TOLERANCE) / 100:
-            return groups.brightest(count), chosen, groups.note(count, why)
-        count, why = max(count // 2, lights), f"beyond the limit of {lights} lights"
+            break
+        count = max(count // 2, lights)
+    count, chosen = best
+    why = "too faint to make noise"
+    if count < groups.noisy:
+        why = f"beyond the limit of {lights} lights"
+    return groups.brightest(count), chosen, groups.note(count, why)
 
 
 def whole_lights(light: RegionLight, strata: Strata) -> WholeLights:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import bpy
@@ -177,10 +178,19 @@ def ball_mesh(radius: float) -> bpy.types.Mesh:
 
 def render(scene: bpy.types.Scene, folder: Path, samples: int, seed: int = 0) -> np.ndarray:
     """Render and give the linear pixels, float64 (height, width, 3)."""
-    scene.cycles.samples = samples
-    scene.cycles.seed = seed
+    return timed_render(scene, folder, samples, seed)[0]
+
+
+def timed_render(
+    scene: bpy.types.Scene, folder: Path, samples: int, seed: int
+) -> tuple[np.ndarray, float]:
+    """Linear pixels, float64 (height, width, 3 or 4), and wall seconds of the render call alone."""
+    scene.cycles.samples, scene.cycles.seed = samples, seed
     path = folder / "render.exr"
     scene.render.filepath = str(path)
+    started = time.perf_counter()
     bpy.ops.render.render(write_still=True)
+    seconds = time.perf_counter() - started
     with OpenEXR.File(str(path)) as file:
-        return file.channels()["RGB"].pixels.astype(np.float64)
+        (channel,) = file.channels().values()
+        return channel.pixels.astype(np.float64), seconds

@@ -7,6 +7,7 @@ is drawn in proportion to the map's light, and the occluder's edge passes near i
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from sunsplit.core.environment import LUMINANCE_WEIGHTS
 from sunsplit.core.suns import Sun
 
 Floats = NDArray[np.float64]
+OfCosine = Callable[[Floats, slice], Floats]
 
 AIMED = 0.7
 """Part of the set-ups whose occluder is aimed at light."""
@@ -53,10 +55,13 @@ class Occluders:
         """The same surfaces in the open."""
         return Occluders(self.normals, self.axes, np.full_like(self.cosines, NEVER))
 
-    def irradiance(self, directions: Floats, flux: Floats, squared: bool = False) -> Floats:
+    def irradiance(
+        self, directions: Floats, flux: Floats, of_cosine: OfCosine | None = None
+    ) -> Floats:
         """Of each surface, (s, c), from lights of no width: directions (n, 3), flux (n, c).
 
-        squared: with the square of the cosine.
+        of_cosine: what counts instead of the cosine, given the cosines (m, s) of some lights, and
+        which of all they are.
         """
         total = np.zeros((len(self.normals), flux.shape[1]))
         single = self.cosines[:, 1] == NEVER
@@ -72,8 +77,8 @@ class Occluders:
                 if cones > 1:
                     hidden = hidden.reshape(len(part), -1, cones).any(axis=2)
                 facing[hidden] = 0
-                if squared:
-                    facing *= facing
+                if of_cosine:
+                    facing = of_cosine(facing, slice(start, start + len(part)))
                 total[some] += facing.T @ flux[start : start + AT_ONCE]
         return total
 

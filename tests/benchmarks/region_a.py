@@ -2,9 +2,8 @@
 
     .venv-5.2/bin/python -m tests.benchmarks.region_a [MAP ...] [--width N] [--seeds N] [-o FOLDER]
 
-For each map the plain HDRI as Blender sets it up, then splits at several thresholds ("calm": the
-brightest pixel of the residual in means of the residual) with several world samplings, all
-interleaved in one run. Noise is the RMS over seeds relative to the picture's mean; a cost of 1 is
+For each map the plain HDRI as Blender sets it up, then splits at the border that the program
+chooses and at some times that luminance, with several world samplings, all interleaved in one run. Noise is the RMS over seeds relative to the picture's mean; a cost of 1 is
 the time to equal noise of the plain HDRI: (noise / noise_plain)^2 x time / time_plain. Below 1 is
 better than the plain HDRI.
 """
@@ -21,7 +20,14 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-import sunsplit.core.strata as strata
+from sunsplit.addon.scene import convert_scene
+from sunsplit.addon.world import find_light, read_image
+from sunsplit.core.environment import luminance
+from sunsplit.core.noise import borders
+from sunsplit.core.sampling import contrast
+from sunsplit.core.settings import ConversionSettings
+from sunsplit.core.sphere import row_solid_angles
+from sunsplit.core.strata import stratify_at
 from tests.blender import (
     add_mesh,
     ball_mesh,
@@ -37,24 +43,26 @@ from tests.blender import (
 
 SAMPLE = Path(__file__).parents[2] / "sample_scenes" / "spruit_sunrise_1k.hdr"
 
-CALM = (100.0, 30.0, 10.0)
-SAMPLINGS = ("NONE", "512", "AUTOMATIC")
+TIMES = (8.0, 4.0, 2.0, 1.0, 0.5)
+SAMPLINGS = ("NONE", "512")
 
 
 @dataclass(frozen=True)
 class Row:
-    """One configuration: calm and sampling are empty for the plain HDRI."""
+    """One configuration. times: the program's border; None is the plain HDRI."""
 
-    calm: float | None
+    times: float | None
     sampling: str
 
     def __str__(self) -> str:
-        return "plain HDRI" if self.calm is None else f"calm {self.calm:g}, {self.sampling}"
+        what = "plain HDRI" if self.times is None else f"{self.times:g} x"
+        return f"{what}, {self.sampling}"
 
 
 @dataclass(frozen=True)
 class Result:
     row: Row
+    suns: int
     share: float
     moment: float
     peak: float
@@ -65,8 +73,10 @@ class Result:
 
 ROWS = (
     Row(None, "AUTOMATIC"),
-    *(Row(calm, s) for calm in CALM for s in SAMPLINGS),
-    Row(strata.CALM, "as set"),
+    Row(None, "NONE"),
+    Row(None, "512"),
+    *(Row(times, s) for times in TIMES for s in SAMPLINGS),
+    Row(1.0, "as set"),
 )
 
 
@@ -111,38 +121,44 @@ def columns_and_balls(path: Path, width: int) -> bpy.types.Scene:
     return scene
 
 
-def set_up(scene: bpy.types.Scene, row: Row) -> tuple[float, float, float]:
-    """Convert as a row asks for; (share of the suns, second moment and peak of the residual)."""
-    if row.calm is None:
-        return 0.0, 0.0, 0.0
-    from sunsplit.addon.scene import convert_scene
-    from sunsplit.core.sampling import contrast
-    from sunsplit.core.settings import ConversionSettings
-
-    default = strata.CALM
-    strata.CALM = row.calm
-    try:
-        conversion = convert_scene(scene, ConversionSettings()).conversion
-    finally:
-        strata.CALM = default
+def set_up(scene: bpy.types.Scene, row: Row) -> tuple[int, float, float, float]:
+    """Convert as a row asks for: number and share of the suns, second moment and peak of the
+    residual."""
+    facts = 0, 0.0, 0.0, 0.0
+    if row.times is not None:
+        share = None if row.sampling == "as set" else share_above(scene, row.times)
+        conversion = convert_scene(scene, ConversionSettings(share=share)).conversion
+        facts = (
+            len(conversion.suns),
+            conversion.account.share,
+            *contrast(conversion.residual),
+        )
     world = scene.world.cycles
     if row.sampling.isdecimal():
         world.sampling_method, world.sample_map_resolution = "MANUAL", int(row.sampling)
     elif row.sampling != "as set":
         world.sampling_method = row.sampling
-    return conversion.account.share, *contrast(conversion.residual)
+    return facts
+
+
+def share_above(scene: bpy.types.Scene, times: float) -> float:
+    """Of all light, what lies above so many times the border that the program would choose."""
+    found = read_image(find_light(scene.world).image)
+    lum = luminance(found.radiance)
+    best = borders(lum, row_solid_angles(found.width, found.height)).best_level
+    return stratify_at(lum, times * best, 2).share
 
 
 def table(path: Path, results: list[Result]) -> Iterator[str]:
     """Markdown."""
     plain = results[0]
     yield f"\n### {path.stem}\n"
-    yield "| configuration | suns' share | moment | peak | noise | cpu s | mean | cost |"
-    yield "| --- | --- | --- | --- | --- | --- | --- | --- |"
+    yield "| configuration | suns | their share | moment | peak | noise | cpu s | mean | cost |"
+    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"
     for r in results:
         cost = (r.noise / plain.noise) ** 2 * r.seconds / plain.seconds
         yield (
-            f"| {r.row} | {r.share:.3f} | {r.moment:.2f} | {r.peak:.0f} | {r.noise:.4f} "
+            f"| {r.row} | {r.suns} | {r.share:.3f} | {r.moment:.2f} | {r.peak:.0f} | {r.noise:.4f} "
             f"| {r.seconds:.2f} | {r.mean / plain.mean - 1:+.2%} | {cost:.2f} |"
         )
 

@@ -4,8 +4,8 @@
 
 The same surfaces behind the same occluders as in `lights` look at suns and residual as the target
 shows them. For Cycles the residual has its shadows, but also noise: the error is that of SAMPLES
-samples a pixel, each with one ray to a point of a lamp and one to the residual, sampled as the
-conversion sets it up (by surfaces, or by a table). For export the residual shines from everywhere
+samples a pixel, each with a ray of the surface's own that meets the residual, and one towards a
+point of a lamp or, where the conversion sets that up, of the residual by a table. For export the residual shines from everywhere
 without shadows, and there is no noise.
 """
 
@@ -18,16 +18,22 @@ from pathlib import Path
 
 import numpy as np
 
-from sunsplit.core import ConversionSettings, EnvironmentMap, convert, load
+from sunsplit.core import ConversionSettings, EnvironmentMap, convert, load, sphere
 from sunsplit.core.conversion import Conversion
 from sunsplit.core.environment import LUMINANCE_WEIGHTS
 from sunsplit.core.patches import patches_of
-from sunsplit.core.region import RegionLight, light_of_map
+from sunsplit.core.region import light_of_map
+from sunsplit.core.residual import reduced
 from sunsplit.core.sampling import choose_sampling
 from tests.benchmarks.occluders import Occluders, draw_occluders, light_of, light_of_suns
 
 SHARES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 1.0)
-SAMPLES = 64
+SAMPLES = 256
+"""A final picture: few enough that noise counts, many enough that what stays wrong does."""
+
+COARSE = 256
+"""Width of a residual at which its noise is summed: it is calm, or found by its table."""
+
 FINE = 65_536
 """Patches of a residual: it is calm, and so many are wrong by a hundredth of what is measured."""
 
@@ -69,57 +75,67 @@ def results_of(
 
 
 def _in_cycles(conversion: Conversion, occluders: Occluders, truth: np.ndarray) -> float:
-    suns, noise = _suns(conversion, occluders)
-    given = suns
-    if conversion.residual is not None:
-        radiance = conversion.residual
-        rest = _irradiance(occluders, radiance)
-        given = given + rest
-        table = choose_sampling(radiance).method != "NONE"
-        noise = noise + (_by_table if table else _by_surfaces)(occluders, radiance) - rest**2
+    residual, share = conversion.residual, conversion.account.share
+    table = choose_sampling(residual, share).method != "NONE"
+    # The ray towards a light goes to one of the suns, or to the table of the residual.
+    to_table = 1 - share if table else 0.0
+    given, noise = _suns(conversion, occluders, 1 - to_table)
+    if residual is not None:
+        given = given + _irradiance(occluders, residual)
+        noise = noise + _noise(occluders, residual, to_table)
     return float(np.sqrt(np.mean((given - truth) ** 2 + np.maximum(noise, 0) / SAMPLES)))
 
 
 def _exported(conversion: Conversion, occluders: Occluders, truth: np.ndarray) -> float:
-    given, _ = _suns(conversion, occluders)
+    given, _ = _suns(conversion, occluders, 1)
     if conversion.residual is not None:
         given = given + _irradiance(occluders.without_occluders(), conversion.residual)
     return float(np.sqrt(np.mean((given - truth) ** 2)))
 
 
-def _suns(conversion: Conversion, occluders: Occluders) -> tuple[np.ndarray, np.ndarray]:
+def _suns(
+    conversion: Conversion, occluders: Occluders, asked: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Irradiance of all suns, and its variance if one of them is asked at a time, in proportion to
-    what it would give a surface that faces it: Cycles does not look which way a surface faces."""
+    what it would give a surface that faces it: Cycles does not look which way a surface faces.
+
+    asked: part of the rays that go to suns.
+    """
     if not conversion.suns:
         return np.zeros(len(occluders.normals)), np.zeros(len(occluders.normals))
     directions, flux = light_of_suns(conversion.suns)
     light = (flux @ LUMINANCE_WEIGHTS)[:, None]
     seen = occluders.irradiance(directions, light)[:, 0]
-    squared = occluders.irradiance(directions, light, squared=True)[:, 0]
-    return seen, light.sum() * squared - seen**2
+    squared = occluders.irradiance(directions, light, lambda cosine, _: cosine**2)[:, 0]
+    return seen, light.sum() / asked * squared - seen**2
 
 
 def _irradiance(occluders: Occluders, radiance: np.ndarray) -> np.ndarray:
-    return _seen(occluders, light_of_map(radiance))
-
-
-def _by_surfaces(occluders: Occluders, radiance: np.ndarray) -> np.ndarray:
-    """Mean square of a sample of a cosine lobe: pi times the irradiance of R^2."""
-    luminance = (radiance @ LUMINANCE_WEIGHTS)[..., None].astype(np.float64)
-    grey = np.broadcast_to(luminance**2, radiance.shape)
-    return np.pi * _seen(occluders, light_of_map(grey))
-
-
-def _by_table(occluders: Occluders, radiance: np.ndarray) -> np.ndarray:
-    """Mean square of a sample in proportion to radiance: all of it times that of R cos^2."""
     light = light_of_map(radiance)
-    return light.luminous_flux.sum() * _seen(occluders, light, squared=True)
-
-
-def _seen(occluders: Occluders, light: RegionLight, squared: bool = False) -> np.ndarray:
     patches = patches_of(light, light.luminous_flux, FINE)
-    flux = (patches.flux @ LUMINANCE_WEIGHTS)[:, None]
-    return occluders.irradiance(patches.directions, flux, squared)[:, 0]
+    return occluders.irradiance(patches.directions, patches.flux @ LUMINANCE_WEIGHTS[:, None])[:, 0]
+
+
+def _noise(occluders: Occluders, radiance: np.ndarray, to_table: float) -> np.ndarray:
+    """Variance of a ray of the surface's own, by the cosine, and, for a part of the samples, one by
+    a table of the residual's light; both weighted by the balance heuristic."""
+    width = min(COARSE, radiance.shape[1])
+    bright = (reduced(radiance, width) @ LUMINANCE_WEIGHTS).astype(np.float64).reshape(-1, 1)
+    directions = sphere.pixel_directions(np.arange(len(bright)), width, width // 2)
+    flux = bright * np.repeat(sphere.row_solid_angles(width, width // 2), width)[:, None]
+    by_table = to_table * bright / flux.sum()
+
+    def square(cosine: np.ndarray, some: slice) -> np.ndarray:
+        chance = np.maximum(cosine / np.pi + by_table[some], 1e-300)
+        return bright[some] * cosine**2 / chance
+
+    def own_part(cosine: np.ndarray, some: slice) -> np.ndarray:
+        return cosine**2 / np.pi / np.maximum(cosine / np.pi + by_table[some], 1e-300)
+
+    seen, own, squared = (
+        occluders.irradiance(directions, flux, change)[:, 0] for change in (None, own_part, square)
+    )
+    return squared - own**2 - (seen - own) ** 2
 
 
 def table(results: Sequence[Result]) -> str:

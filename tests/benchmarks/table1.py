@@ -25,7 +25,8 @@ from tqdm import tqdm
 
 from sunsplit.core.settings import ConversionSettings
 from tests.benchmarks import table1_plots, table1_report
-from tests.benchmarks.table1_scene import figurine_scene, key_azimuth, surfaces, timed_render
+from tests.benchmarks.table1_scene import figurine_scene, key_azimuth, surfaces
+from tests.blender import timed_render
 
 SAMPLE = Path(__file__).parents[2] / "sample_scenes" / "spruit_sunrise_1k.hdr"
 

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import bpy
 import numpy as np
-import OpenEXR
 from mathutils import Matrix
 
 from sunsplit.core import sphere
 from sunsplit.core.environment import luminance
 from sunsplit.core.files.maps import load
-from tests.blender import add_mesh, camera_towards, diffuse, fresh_scene, hdri_world, plate_mesh
+from tests.blender import (
+    add_mesh,
+    camera_towards,
+    diffuse,
+    fresh_scene,
+    hdri_world,
+    plate_mesh,
+    timed_render,
+)
 from tests.blender import material as principled
 
 KEY_ANGLE = np.radians(60)
@@ -75,18 +81,3 @@ def surfaces(scene: bpy.types.Scene, folder: Path) -> np.ndarray:
     scene.render.film_transparent = False
     scene.render.image_settings.color_mode = "RGB"
     return alpha > 0.9999
-
-
-def timed_render(
-    scene: bpy.types.Scene, folder: Path, samples: int, seed: int
-) -> tuple[np.ndarray, float]:
-    """Linear pixels, float64, and the wall seconds of the render call alone."""
-    scene.cycles.samples, scene.cycles.seed = samples, seed
-    path = folder / "table1.exr"
-    scene.render.filepath = str(path)
-    started = time.perf_counter()
-    bpy.ops.render.render(write_still=True)
-    seconds = time.perf_counter() - started
-    with OpenEXR.File(str(path)) as file:
-        (channel,) = file.channels().values()
-        return channel.pixels.astype(np.float64), seconds

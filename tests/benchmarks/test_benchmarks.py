@@ -5,8 +5,9 @@ from __future__ import annotations
 import sys
 
 import numpy as np
+import pytest
 
-from tests.benchmarks import lights, methods, region_a, shares, table1, voronoi
+from tests.benchmarks import equal_error, lights, methods, region_a, shares, table1, voronoi
 
 
 def test_region_a(tmp_path, monkeypatch, sunrise):
@@ -14,12 +15,23 @@ def test_region_a(tmp_path, monkeypatch, sunrise):
     monkeypatch.setattr(sys, "argv", [*arguments, "-o", str(tmp_path)])
     region_a.main()
     lines = (tmp_path / "region_a.md").read_text().splitlines()
-    rows = [line.split("|") for line in lines if line.startswith("| calm")]
-    assert len(rows) == len(region_a.ROWS) - 1
-    share = {row[1].strip(): float(row[2]) for row in rows}
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if "| " in line]
+    rows = {row[0]: row for row in cells if row[0].startswith(("plain", "0", "1", "2", "4", "8"))}
+    assert len(rows) == len(region_a.ROWS)
     # The lower the border, the more light is in the suns.
-    assert share["calm 100, NONE"] < share["calm 30, NONE"] < share["calm 10, NONE"]
-    assert share["calm 30, as set"] == share["calm 30, 512"]
+    shares = [float(rows[f"{times:g} x, NONE"][2]) for times in region_a.TIMES]
+    assert shares == sorted(shares)
+    assert float(rows["1 x, as set"][2]) == pytest.approx(shares[3], abs=0.01)
+
+
+def test_equal_error(tmp_path, sunrise):
+    few = ["--scenes", "outdoor", "room", "--size", "16", "--samples", "1", "4"]
+    few += ["--reference", "16", "-o", str(tmp_path)]
+    curves = equal_error.main([str(sunrise), *few])
+    assert len(curves) == 2 * (2 + len(equal_error.BY_HAND))
+    assert all(curve.noise > 0 and curve.each > 0 for curve in curves)
+    lines = (tmp_path / "equal_error.md").read_text().splitlines()
+    assert sum(line.startswith("| spruit_sunrise_1k") for line in lines) == 2
 
 
 def test_methods(tmp_path, sunrise):

@@ -18,21 +18,28 @@ def test_contrast_of_one_lit_pixel_is_the_sphere_over_the_pixel():
     assert contrast(pixels) == pytest.approx((4 * np.pi / solid,) * 2, rel=1e-9)
 
 
-@pytest.mark.parametrize(("part", "method"), [(0.5, "NONE"), (0.02, "MANUAL"), (1e-4, "AUTOMATIC")])
+@pytest.mark.parametrize(("part", "method"), [(0.7, "NONE"), (0.02, "MANUAL"), (1e-4, "AUTOMATIC")])
 def test_the_more_peaked_the_larger_the_table(part, method):
     """A band of this part of the sphere shines; the rest is black."""
     pixels = np.zeros((256, 512, 3), np.float32)
     lit = np.random.default_rng(0).random((256, 512)) < part
     pixels[lit] = 1
-    assert choose_sampling(pixels).method == method
+    assert choose_sampling(pixels, 0).method == method
+
+
+def test_what_little_suns_leave_adds_little_noise():
+    pixels = np.full((64, 128, 3), 0.01, np.float32)
+    pixels[20:22, 5:9] = 1
+    assert choose_sampling(pixels, 0.1).method == "MANUAL"
+    assert choose_sampling(pixels, 0.9).method == "NONE"
 
 
 def test_without_a_residual_there_is_nothing_to_sample():
-    assert choose_sampling(None).method == "NONE"
+    assert choose_sampling(None, 0).method == "NONE"
 
 
 def test_cells_get_a_table_as_wide_as_their_map():
     pixels = np.full((64, 128, 3), 0.01, np.float32)
     pixels[20:22, 5:9] = 900
-    assert choose_sampling(pixels, cells=True) == WorldSampling("MANUAL", 128)
-    assert choose_sampling(sky(64, 0.7).astype(np.float32), cells=True).method == "NONE"
+    assert choose_sampling(pixels, 0, cells=True) == WorldSampling("MANUAL", 128)
+    assert choose_sampling(sky(64, 0.7).astype(np.float32), 0, cells=True).method == "NONE"

@@ -2,11 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from sunsplit.core import sphere
-from sunsplit.core.strata import CALM, calm_threshold, stratify
+from sunsplit.core.strata import stratify
 from tests.maps import environment, sky
 
 
@@ -46,18 +44,6 @@ def test_the_whole_share_takes_black_pixels_too():
 def test_equal_pixels_stay_together():
     assert not stratify(environment(sky(16, 1.0)), 0.3, 2).region_a.any()
     assert stratify(environment(sky(16, 1.0)), 0.7, 2).region_a.all()
-
-
-@given(st.integers(0, 2**32 - 1), st.floats(0.5, 6))
-def test_cutting_at_the_calm_threshold_leaves_a_calm_map(seed, spread):
-    random = np.random.default_rng(seed)
-    lum = np.exp(spread * random.standard_normal((16, 32)))
-    solid = sphere.row_solid_angles(32, 16)
-    threshold = calm_threshold(lum, solid)
-    mean = np.minimum(lum, threshold).sum(axis=1) @ solid / (4 * np.pi)
-    assert threshold == pytest.approx(CALM * mean, rel=1e-6) or (
-        threshold == lum.max() and CALM * mean > threshold
-    )
 
 
 def test_a_calm_map_has_no_region_a():

@@ -1,0 +1,167 @@
+"""Noise of a path tracer, and the border between suns and residual that leaves least of it.
+
+A path tracer looks for light in two ways: towards a sun, chosen by its strength, and along its
+own next ray, which meets the residual. On white surfaces of all orientations that nothing shades,
+one sample of each has, in squares of the mean irradiance, the mean variance
+
+    suns:      16 (F_A^2 / 6 - K_A) / F^2              F: light, the integral of L
+    residual:  16 (pi/4 * integral of R^2 - K_B) / F^2   K: mean square of the irradiance
+
+Renders are less noisy by a factor of 2 to 6, but least noisy for the same border
+(docs/benchmarks/region_a.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import sphere
+
+Floats = NDArray[np.float64]
+
+OTHERWISE = 0.1
+"""Variance of a sample that no border changes: penumbrae, edges, mirrors."""
+
+WORTH = 1.1
+"""So much more variance is taken for a higher border: each sun costs time."""
+
+WITHOUT = 3.0
+"""And so much for no suns at all: looking for suns takes two thirds of a picture's time."""
+
+OF_TABLE = 1.0
+"""Variance, about, if the residual is looked for by a table of its light instead: what is left of
+noise where a residual is not calm at all."""
+
+SAMPLES = 256
+"""Noise counts against wrong shadows as in a picture of so many samples a pixel."""
+
+PER_OCTAVE = 4
+"""Borders that are tried; between two of them the variance is flat."""
+
+ROWS = 128
+"""Of blocks, down a map."""
+
+LOWEST = 1.5
+"""The lowest border, in means of the map."""
+
+_LOBE = np.array([np.pi] + 3 * [2 * np.pi / 3] + 5 * [np.pi / 4])
+"""A cosine lobe in spherical harmonics of order 0, 1 and 2: all but 1 % of its square
+(Ramamoorthi and Hanrahan, An Efficient Representation for Irradiance Environment Maps, 2001)."""
+
+def harmonics(directions: Floats) -> Floats:
+    """Real spherical harmonics of order 0 to 2, orthonormal, of unit vectors (n, 3): (n, 9)."""
+    x, y, z = directions.T
+    first, second = np.sqrt(3 / (4 * np.pi)), np.sqrt(15 / (4 * np.pi))
+    return np.stack(
+        [
+            np.full_like(x, np.sqrt(1 / (4 * np.pi))),
+            *(first * axis for axis in (x, y, z)),
+            *(second * pair for pair in (x * y, y * z, z * x)),
+            second / np.sqrt(12) * (3 * z**2 - 1),
+            second / 2 * (x**2 - y**2),
+        ],
+        axis=-1,
+    )
+
+
+def mean_square_irradiance(coefficients: Floats) -> Floats:
+    """Over all orientations, of light with these harmonics (..., 9): (...)."""
+    return ((coefficients * _LOBE) ** 2).sum(axis=-1) / (4 * np.pi)
+
+
+def _of_one_place(coefficients: Floats) -> Floats:
+    """The same if all of that light came from one place: a sixth of it squared, in all orders."""
+    light = coefficients[..., 0] * np.sqrt(4 * np.pi)
+    per_order = np.array([1, 3, 5]) @ _LOBE[[0, 1, 4]] ** 2 / (4 * np.pi) ** 2
+    return light**2 * per_order
+
+
+def squared_noise(variance: float) -> float:
+    """What the variance of a sample comes to in a picture, to compare with squared errors."""
+    return min(variance, OF_TABLE) / SAMPLES
+
+
+@dataclass(frozen=True, eq=False)
+class Borders:
+    """Borders that a map could be cut at, the highest first, which leaves no suns; all (n,).
+
+    level: luminance. suns: variance of what lies above it. residual: of the map cut off there.
+    """
+
+    level: Floats
+    suns: Floats
+    residual: Floats
+
+    @property
+    def variance(self) -> Floats:
+        return self.suns + self.residual + OTHERWISE
+
+    @property
+    def best(self) -> int:
+        """The highest that is about as calm as the calmest, or 0: no suns."""
+        variance = self.variance
+        if variance[0] <= WITHOUT * variance.min():
+            return 0
+        return int(np.argmax(variance <= WORTH * variance.min()))
+
+    @property
+    def best_level(self) -> float:
+        return float(self.level[self.best])
+
+
+def borders(lum: Floats, solid: Floats) -> Borders:
+    """What each border would leave of noise.
+
+    lum: luminance (height, width), not all 0. solid: of a pixel of each row, (height,).
+    """
+    height, width = lum.shape
+    weight, flat = np.repeat(solid, width), lum.ravel()
+    light = float(weight @ flat)
+    level = _levels(float(flat.max()), LOWEST * light / (4 * np.pi))
+    bright = np.flatnonzero(flat > level[-1])
+    bright = bright[np.argsort(-flat[bright], kind="stable")]
+    value, weight_of = flat[bright], weight[bright]
+    # Sums over the 0, 1, 2, ... brightest pixels: of the pixels themselves, and of their light.
+    pixels = weight_of[:, None] * harmonics(sphere.pixel_directions(bright, width, height))
+    count = np.searchsorted(-value, -level)
+    area, shining = _sums_to(pixels, count), _sums_to(pixels * value[:, None], count)
+    suns = shining - level[:, None] * area
+    squares = _sums_to(np.stack([weight_of, weight_of * value**2], axis=-1), count)
+    above = squares[:, 1] - level**2 * squares[:, 0]
+    rest = _all_harmonics(lum * solid[:, None]) - suns
+    unit = 16 / light**2
+    return Borders(
+        level,
+        unit * (_of_one_place(suns) - mean_square_irradiance(suns)),
+        unit * (np.pi / 4 * (weight @ flat**2 - above) - mean_square_irradiance(rest)),
+    )
+
+
+def _levels(highest: float, lowest: float) -> Floats:
+    """Falling evenly in logarithms, the highest at least."""
+    count = max(int(PER_OCTAVE * np.log2(highest / lowest)), 0) + 1
+    return highest * 2.0 ** (-np.arange(count) / PER_OCTAVE)
+
+
+def _sums_to(values: Floats, count: NDArray[np.intp]) -> Floats:
+    """Sums of the first count rows of values (p, c), for many counts (n,): (n, c)."""
+    sums = np.zeros((len(values) + 1, values.shape[1]))
+    np.cumsum(values, axis=0, out=sums[1:])
+    return sums[count]
+
+
+def _all_harmonics(light: Floats) -> Floats:
+    """Harmonics of a whole map, (9,), of the light of its pixels, (height, width).
+
+    Order 2 does not tell the pixels of a small block apart.
+    """
+    height, width = light.shape
+    rows = np.arange(0, height, -(-height // ROWS))
+    columns = np.arange(0, width, -(-height // ROWS))
+    blocks = np.add.reduceat(np.add.reduceat(light, rows, axis=0), columns, axis=1)
+    down, across = (np.append(rows, height) / height, np.append(columns, width) / width)
+    u, v = np.meshgrid((across[1:] + across[:-1]) / 2, (down[1:] + down[:-1]) / 2)
+    return blocks.ravel() @ harmonics(sphere.to_directions(u.ravel(), v.ravel()))
