@@ -210,6 +210,9 @@ class SunsplitSettings(bpy.types.PropertyGroup):
             type=bpy.types.Collection, name="Suns", description="What holds the lamps"
         ),
         "lamps": CollectionProperty(type=SunsplitLamp),
+        "light_tree_off": BoolProperty(
+            name="Light Tree Off", description="Restore switches Cycles' light tree on again"
+        ),
         "report": StringProperty(
             name="Report", description="What the last conversion did, a sentence a line"
         ),

@@ -9,9 +9,12 @@ from typing import Any
 import bpy
 
 from ..core.conversion import Conversion, convert
+from ..core.environment import LUMINANCE_WEIGHTS
 from ..core.errors import UnusableInput
+from ..core.sampling import needs_light_tree
 from ..core.settings import ConversionSettings
 from .lamps import link_lamps, make_lamps, remove_lamps, unlink_lamps
+from .scene_needs import has_other_lights
 from .trace import TAG
 from .world import (
     WorldLight,
@@ -79,6 +82,7 @@ def convert_scene(scene: bpy.types.Scene, settings: ConversionSettings) -> Scene
     light = find_light(world, scene.render.engine)
     conversion = convert(read_image(light.image), settings)
     original = state.original_world if again else world
+    tree_off = _is_without_light_tree(scene, conversion)
     sentences = [*_sentences(conversion), *_warnings(scene, world, original, light)]
     new = converted_world(world, light, conversion)
     lamps = make_lamps(conversion.suns, light, world)
@@ -86,8 +90,19 @@ def convert_scene(scene: bpy.types.Scene, settings: ConversionSettings) -> Scene
     restore_scene(scene)
     name_residual(new, conversion.environment.name)
     result = _install(scene, original, conversion, new, lamps)
+    if tree_off and scene.cycles.use_light_tree:
+        scene.cycles.use_light_tree, state.light_tree_off = False, True
+        sentences.append("Light tree off: nothing here needs the time that it takes.")
     state.report = "\n".join([result.headline, *sentences])
     return result
+
+
+def _is_without_light_tree(scene: bpy.types.Scene, conversion: Conversion) -> bool:
+    """Whether Cycles draws lots among the lamps: only where there is nothing else to choose."""
+    if not hasattr(scene, "cycles") or has_other_lights(scene):
+        return False
+    light = float(conversion.account.source @ LUMINANCE_WEIGHTS)
+    return not needs_light_tree(conversion.suns, light)
 
 
 def _install(
@@ -170,6 +185,9 @@ def restore_scene(scene: bpy.types.Scene) -> None:
     state.original_world = state.converted_world = state.collection = None
     state.lamps.clear()
     state.report = ""
+    if state.light_tree_off and hasattr(scene, "cycles"):
+        scene.cycles.use_light_tree = True
+    state.light_tree_off = False
     unlink_lamps(scene, collection, lamps)
     remove_lamps(lamps)
     if converted is not None and converted != original:

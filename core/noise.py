@@ -51,6 +51,7 @@ _LOBE = np.array([np.pi] + 3 * [2 * np.pi / 3] + 5 * [np.pi / 4])
 """A cosine lobe in spherical harmonics of order 0, 1 and 2: all but 1 % of its square
 (Ramamoorthi and Hanrahan, An Efficient Representation for Irradiance Environment Maps, 2001)."""
 
+
 def harmonics(directions: Floats) -> Floats:
     """Real spherical harmonics of order 0 to 2, orthonormal, of unit vectors (n, 3): (n, 9)."""
     x, y, z = directions.T

@@ -17,7 +17,7 @@ from . import sphere
 from .environment import LUMINANCE_WEIGHTS
 from .patches import Patches
 from .shadow_edges import half_widths
-from .suns import Sun
+from .suns import Sun, disc_on_ground
 
 Floats = NDArray[np.float64]
 
@@ -110,12 +110,16 @@ class Prediction:
     """What surfaces should get from suns.
 
     irradiance: of each surface, luminance, (s,). mean: what surfaces get in the open from the
-    whole map, on average over all that they may face.
+    whole map, on average over all that they may face. ground: what level ground gets in the open,
+    as a part of the light that suns replace, of each channel; nan where a channel has none, (3,).
+    part: of all light that suns replace.
     """
 
     surfaces: Surfaces
     irradiance: Floats
     mean: float
+    ground: Floats
+    part: float
 
     @classmethod
     def of(
@@ -131,13 +135,32 @@ class Prediction:
             wanted += surfaces.of(some)
         if unshadowed is not None:
             wanted -= surfaces.in_the_open().of(unshadowed)
-        return cls(surfaces, wanted, all_light / 4)
+        ground, part = np.full(3, np.nan), 0.0
+        if patches is not None:
+            ground = _parts(patches.flux, np.maximum(patches.directions[:, 2], 0))
+            part = float((patches.flux @ LUMINANCE_WEIGHTS).sum()) / all_light
+        return cls(surfaces, wanted, all_light / 4, ground, part)
 
     def error(self, suns: Sequence[Sun]) -> float:
         """Root mean square of what surfaces get wrong under shadows if these suns stand in for
         the light, as a part of the mean irradiance in the open."""
         given = self.surfaces.irradiance(*_pieces(suns)) if len(suns) else 0.0
         return float(np.sqrt(np.mean((given - self.irradiance) ** 2))) / self.mean
+
+
+    def wrong_on_ground(self, suns: Sequence[Sun]) -> float:
+        """What level ground in the open gets wrong of the worst channel, as a part of all light."""
+        if not len(suns) or np.isnan(self.ground).all():
+            return 0.0
+        seen = [disc_on_ground(float(sun.to_light[2]), sun.angular_diameter / 2) for sun in suns]
+        given = _parts(np.array([sun.scalar_irradiance for sun in suns]), np.array(seen))
+        return float(self.part * np.nanmax(np.abs(given - self.ground)))
+
+
+def _parts(flux: Floats, seen: Floats) -> Floats:
+    """Of each channel of all light, flux (n, 3), the part that is seen; nan of no light."""
+    total = flux.sum(axis=0)
+    return np.where(total > 0, seen @ flux / np.where(total > 0, total, 1), np.nan)
 
 
 def _pieces(suns: Sequence[Sun]) -> tuple[Floats, Floats, Floats]:

@@ -1,15 +1,19 @@
-"""How a path tracer should sample a residual map: what Cycles calls world importance sampling."""
+"""How a path tracer should look for light: for the residual, what Cycles calls world importance
+sampling; for suns, whether by its light tree."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .environment import luminance
+from .environment import LUMINANCE_WEIGHTS, luminance
+from .noise import OTHERWISE, harmonics, mean_square_irradiance
 from .sphere import row_solid_angles
+from .suns import Sun
 
 CALM_ENOUGH = 0.5
 """Variance of a sample, in squares of the mean irradiance of suns and residual, up to which
@@ -28,6 +32,11 @@ SMALL_TABLE = 512
 
 WIDEST_TABLE = 8192
 """The widest that Cycles makes."""
+
+
+TIME_BY_TREE, TIME_BY_LOT = 0.05, 0.01
+"""More time for each sun, as a part of a picture's, where a path tracer chooses among suns by their
+strength, with a light tree, and where it draws lots; by docs/benchmarks/light_tree.md."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +64,23 @@ def choose_sampling(
     if cells:
         return WorldSampling("MANUAL", min(residual.shape[1], WIDEST_TABLE))
     return WorldSampling("AUTOMATIC" if peak > CALM_PEAK else "MANUAL")
+
+
+def needs_light_tree(suns: Sequence[Sun], light: float) -> bool:
+    """Whether suns should be chosen by their strength, which takes time for each, or by lot, which
+    is noisier where they are not alike.
+
+    light: luminance of the whole map's scalar irradiance.
+    """
+    if len(suns) <= 1:
+        return False
+    flux = np.array([sun.scalar_irradiance for sun in suns]) @ LUMINANCE_WEIGHTS / light
+    shine = flux @ harmonics(np.array([sun.to_light for sun in suns]))
+    seen = float(mean_square_irradiance(shine))
+    count = len(flux)
+    by_strength = 16 * (flux.sum() ** 2 / 6 - seen) + OTHERWISE
+    by_lot = 16 * (count * (flux**2).sum() / 6 - seen) + OTHERWISE
+    return by_strength * (1 + TIME_BY_TREE * count) < by_lot * (1 + TIME_BY_LOT * count)
 
 
 def contrast(radiance: NDArray[np.float32]) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from . import sphere
 from .environment import EnvironmentMap, luminance
 from .noise import borders
 
+
 @dataclass(frozen=True, eq=False)
 class Strata:
     """n strata of one map.
@@ -38,6 +39,15 @@ class Strata:
         """Luminance of the whole map's scalar irradiance."""
         height, width = self.luminance.shape
         return float(self.luminance.sum(axis=1) @ sphere.row_solid_angles(width, height))
+
+    @property
+    def part_on_ground(self) -> float:
+        """Irradiance of level ground in the open as a part of all light, and a fortieth at least:
+        where all light comes from below, nothing hangs on the ground."""
+        height, width = self.luminance.shape
+        solid = sphere.row_solid_angles(width, height)
+        facing = np.maximum(np.cos(sphere.centroid_angles(width, height)[1]), 0)
+        return max(float(self.luminance.sum(axis=1) @ (solid * facing)) / self.light, 1 / 40)
 
     @property
     def square(self) -> float:

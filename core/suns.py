@@ -51,6 +51,23 @@ def disc_diameter(shortfall: float) -> float:
     return min(4 * float(np.arcsin(np.sqrt(min(shortfall, 0.5)))), np.pi)
 
 
+def disc_on_ground(height: float, half_angle: float) -> float:
+    """Mean over a disc of what level ground gets: the cosine, 0 below the horizon.
+
+    height: of its middle, the sine of the elevation. half_angle: radians, 0 for a point.
+    """
+    if half_angle == 0:
+        return max(height, 0.0)
+    along = 1 - _RINGS * 2 * np.sin(half_angle / 2) ** 2
+    aside = np.sqrt((1 - along**2) * max(1 - height**2, 0))
+    return float(np.maximum((along * height)[:, None] + aside[:, None] * _AROUND, 0).mean())
+
+
+_RINGS = (np.arange(8) + 0.5) / 8
+_AROUND = np.cos((np.arange(16) + 0.5) / 16 * np.pi)
+"""A disc as rings of equal area and places around each; the other half is alike."""
+
+
 def point_sun(flux: NDArray[np.float64], to_light: NDArray[np.float64], stratum: int) -> Sun:
     """A light of no width (paper, 2.2): all of a cell's light from one direction."""
     return Sun(to_light, flux, flux, 0.0, stratum)

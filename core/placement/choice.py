@@ -29,7 +29,7 @@ def choose_suns(
     rest = patches_of(unshadowed, unshadowed.luminous_flux) if unshadowed else None
     if not len(light.pixels):
         error = Prediction.of(None, strata.light, rest).error(()) if rest else 0.0
-        return ChosenSuns((), error, (NO_SUN,) if settings.share is None else ())
+        return ChosenSuns((), error, (NO_SUN,) if settings.share is None else (), 0.0)
     patches = patches_of(light, strata.luminance.ravel()[light.pixels])
     prediction = Prediction.of(patches, strata.light, rest)
 
@@ -38,7 +38,11 @@ def choose_suns(
             chosen = edge_suns(patches, strata, settings, count)
         else:
             chosen = sampled_suns(light, strata, settings, count)
-        return replace(chosen, predicted_error=prediction.error(chosen.suns))
+        return replace(
+            chosen,
+            predicted_error=prediction.error(chosen.suns),
+            ground_error=prediction.wrong_on_ground(chosen.suns) / strata.part_on_ground,
+        )
 
     share = float(light.luminous_flux.sum()) / strata.light
     allowed = settings.allowed_error(share)
@@ -55,7 +59,7 @@ def _count_note(
 ) -> list[str]:
     """Why there are not as many lights as were asked for, or not as few errors."""
     made, asked = len(chosen.suns), settings.lights
-    percent = 100 * chosen.predicted_error
+    percent = 100 * chosen.worst
     if allowed is not None and percent > allowed:
         more = "" if asked else ": set the number of lights for more"
         return [

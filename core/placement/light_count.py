@@ -13,7 +13,7 @@ guess, so that few numbers must be tried."""
 
 
 def fewest(with_lights: Callable[[int], ChosenSuns], allowed: float, most: int) -> ChosenSuns:
-    """The fewest suns, at most `most`, whose predicted error is at most `allowed`.
+    """The fewest suns, at most `most`, that are wrong by at most `allowed`: `ChosenSuns.worst`.
 
     Where even `most` are not enough, those that are least wrong of all that were tried. The error
     need not fall evenly with the number; the next smaller number than is returned was tried too,
@@ -24,12 +24,12 @@ def fewest(with_lights: Callable[[int], ChosenSuns], allowed: float, most: int) 
     def error(count: int) -> float:
         if count not in tried:
             tried[count] = with_lights(count)
-        return tried[count].predicted_error
+        return tried[count].worst
 
     low, high = 0, 1
     while error(high) > allowed:
         if high >= most:
-            return min(tried.values(), key=lambda one: one.predicted_error)
+            return min(tried.values(), key=lambda one: one.worst)
         low, high = high, min(max(_guess(high, error(high), allowed), high + 1), most)
     while high - low > 1:
         middle = (low + high) // 2

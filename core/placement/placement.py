@@ -38,16 +38,28 @@ class Placement:
         return _nearest_sites(self.light, self.sites) if self.given is None else self.given
 
 
+ON_GROUND = 0.6
+"""So much of a tolerance is allowed on level ground."""
+
+
 @dataclass(frozen=True, eq=False)
 class ChosenSuns:
     """Suns, brightest first, and notes for the user.
 
-    predicted_error: see `prediction.Prediction`; nan before it is known.
+    predicted_error: see `prediction.Prediction`. ground_error: of the irradiance of level ground in
+    the open, by the worst channel. Both nan before they are known.
     """
 
     suns: tuple[Sun, ...]
     predicted_error: float
     notes: tuple[str, ...]
+    ground_error: float = np.nan
+
+    @property
+    def worst(self) -> float:
+        """What a tolerance is held against. What level ground gets wrong is wrong all over a
+        picture, and counts more."""
+        return max(self.predicted_error, self.ground_error / ON_GROUND)
 
 
 Place = Callable[[RegionLight, int], Placement]

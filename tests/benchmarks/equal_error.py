@@ -77,9 +77,7 @@ def curves_of(path: Path, scene: str, options: argparse.Namespace) -> list[Curve
     return [_curve((path.stem, scene, way, ways[way]), shots[way], halves) for way in ways]
 
 
-def _prepared(
-    path: Path, scene: str, options: argparse.Namespace, folder: Path
-) -> dict[str, int]:
+def _prepared(path: Path, scene: str, options: argparse.Namespace, folder: Path) -> dict[str, int]:
     """Each way as a file in the folder; its lamps."""
     made = SCENES[scene](path.resolve(), options.size)
     ways = {}

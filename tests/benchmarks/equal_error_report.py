@@ -40,7 +40,8 @@ def write(curves: Sequence[Curve], folder: Path) -> None:
             for error in TARGETS
         ]
         own = [split.seconds_to(error) for error in TARGETS]
-        gain = np.array([plain, hand]) / own
+        with np.errstate(invalid="ignore"):  # neither gets there
+            gain = np.array([plain, hand]) / own
         gains.append(gain)
         best = [
             min((w for w in of_pair if w != SPLIT), key=lambda w, e=e: of_pair[w].seconds_to(e))

@@ -2,10 +2,10 @@
 
     .venv-5.2/bin/python -m tests.benchmarks.region_a [MAP ...] [--width N] [--seeds N] [-o FOLDER]
 
-For each map the plain HDRI as Blender sets it up, then splits at the border that the program
-chooses and at some times that luminance, with several world samplings, all interleaved in one run. Noise is the RMS over seeds relative to the picture's mean; a cost of 1 is
-the time to equal noise of the plain HDRI: (noise / noise_plain)^2 x time / time_plain. Below 1 is
-better than the plain HDRI.
+For each map the plain HDRI, then splits at the border that the program chooses and at some times
+that luminance, with several world samplings, all interleaved in one run. Noise is the RMS over
+seeds relative to the picture's mean; a cost of 1 is the time to equal noise of the plain HDRI as
+Blender sets it up: (noise / noise_plain)^2 x time / time_plain. Below 1 is better.
 """
 
 from __future__ import annotations

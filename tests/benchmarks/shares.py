@@ -5,8 +5,8 @@
 The same surfaces behind the same occluders as in `lights` look at suns and residual as the target
 shows them. For Cycles the residual has its shadows, but also noise: the error is that of SAMPLES
 samples a pixel, each with a ray of the surface's own that meets the residual, and one towards a
-point of a lamp or, where the conversion sets that up, of the residual by a table. For export the residual shines from everywhere
-without shadows, and there is no noise.
+point of a lamp or, where the conversion sets that up, of the residual by a table. For export the
+residual shines from everywhere without shadows, and there is no noise.
 """
 
 from __future__ import annotations
