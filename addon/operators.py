@@ -27,7 +27,7 @@ class SUNSPLIT_OT_convert(bpy.types.Operator):
 
         chosen = self._chosen(context.scene.sunsplit)
         try:
-            result = convert_scene(context.scene, settings_for(chosen))
+            result = convert_scene(context.scene, settings_for(chosen), bool(chosen["skips"]))
         except SunsplitError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

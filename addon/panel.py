@@ -80,6 +80,7 @@ def draw_settings(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
         _row(layout, settings, "residual_samples", rest)
     if settings.residual != "none":
         _row(layout, settings, "residual_width", rest)
+    layout.prop(settings, "skips")
 
 
 def _row(

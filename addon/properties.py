@@ -186,6 +186,13 @@ CHOICES = {
         max=MOST["residual_samples"],
         soft_max=4096,
     ),
+    "skips": BoolProperty(
+        name="Skip What Is Not Needed",
+        description="Leave out what this scene, as it is now, cannot show: an HDRI that the camera "
+        "does not see, details that nothing mirrors, Cycles' light tree",
+        default=True,
+        options=_FRESH,
+    ),
 }
 """The settings of a conversion, once: for the scene and as arguments of the operator."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -14,7 +14,7 @@ from ..core.errors import UnusableInput
 from ..core.sampling import needs_light_tree
 from ..core.settings import ConversionSettings
 from .lamps import link_lamps, make_lamps, remove_lamps, unlink_lamps
-from .scene_needs import has_other_lights
+from .scene_needs import ALL, SceneNeeds, needs_of
 from .trace import TAG
 from .world import (
     WorldLight,
@@ -46,6 +46,7 @@ class SceneConversion:
 def settings_for(chosen: Mapping[str, Any]) -> ConversionSettings:
     """The values of the panel, by the names of `properties.CHOICES`, as the core wants them."""
     values = dict(chosen)
+    values.pop("skips")
     share = None if values.pop("share_auto") else float(values["share"])
     return ConversionSettings(
         **values
@@ -62,8 +63,12 @@ def settings_for(chosen: Mapping[str, Any]) -> ConversionSettings:
     )
 
 
-def convert_scene(scene: bpy.types.Scene, settings: ConversionSettings) -> SceneConversion:
+def convert_scene(
+    scene: bpy.types.Scene, settings: ConversionSettings, skips: bool = True
+) -> SceneConversion:
     """Replace a scene's world and add lamps.
+
+    skips: whether what the scene does not need, as it is now, is left out.
 
     A converted world is converted again as the user has left it, turned or with another map;
     what Restore brings back stays the world that there was first. A world that the user has
@@ -80,29 +85,65 @@ def convert_scene(scene: bpy.types.Scene, settings: ConversionSettings) -> Scene
             "restore it there, or choose the original world."
         )
     light = find_light(world, scene.render.engine)
-    conversion = convert(read_image(light.image), settings)
+    needs = needs_of(scene) if skips else ALL
+    environment = read_image(light.image)
+    conversion = convert(environment, _without_excess(settings, environment.width, needs))
     original = state.original_world if again else world
-    tree_off = _is_without_light_tree(scene, conversion)
-    sentences = [*_sentences(conversion), *_warnings(scene, world, original, light)]
-    new = converted_world(world, light, conversion)
+    tree_off = _is_without_light_tree(scene, conversion, needs)
+    sentences = [
+        *_sentences(conversion),
+        *_skipped(conversion, settings, needs, tree_off),
+        *_warnings(scene, world, original, light),
+    ]
+    new = converted_world(world, light, conversion, needs.camera_sees_world)
     lamps = make_lamps(conversion.suns, light, world)
     # From here on `light` must not be used: its nodes go with the world that is replaced.
     restore_scene(scene)
     name_residual(new, conversion.environment.name)
     result = _install(scene, original, conversion, new, lamps)
-    if tree_off and scene.cycles.use_light_tree:
+    if tree_off:
         scene.cycles.use_light_tree, state.light_tree_off = False, True
-        sentences.append("Light tree off: nothing here needs the time that it takes.")
     state.report = "\n".join([result.headline, *sentences])
     return result
 
 
-def _is_without_light_tree(scene: bpy.types.Scene, conversion: Conversion) -> bool:
-    """Whether Cycles draws lots among the lamps: only where there is nothing else to choose."""
-    if not hasattr(scene, "cycles") or has_other_lights(scene):
+def _without_excess(
+    settings: ConversionSettings, width: int, needs: SceneNeeds
+) -> ConversionSettings:
+    """With a narrower residual where nothing could tell it from one as wide as the map."""
+    if settings.residual_width is not None:
+        return settings
+    return replace(settings, residual_width=needs.residual_width(width))
+
+
+def _is_without_light_tree(
+    scene: bpy.types.Scene, conversion: Conversion, needs: SceneNeeds
+) -> bool:
+    """Whether Cycles shall draw lots among the lamps, where there is nothing else to choose."""
+    if not hasattr(scene, "cycles") or needs.other_lights:
         return False
+    if not scene.cycles.use_light_tree and not scene.sunsplit.light_tree_off:
+        return False  # as the user has it
     light = float(conversion.account.source @ LUMINANCE_WEIGHTS)
     return not needs_light_tree(conversion.suns, light)
+
+
+def _skipped(
+    conversion: Conversion, settings: ConversionSettings, needs: SceneNeeds, tree_off: bool
+) -> list[str]:
+    """What was left out, and why."""
+    lines = []
+    width = conversion.settings.residual_width
+    if width != settings.residual_width:
+        lines.append(
+            f"Skipped: nothing mirrors sharply, so the world that lights is {width} pixels wide "
+            f"instead of {conversion.environment.width}."
+        )
+    if not needs.camera_sees_world:
+        lines.append("Skipped: the camera does not see the world, so renders do not load the HDRI.")
+    if tree_off:
+        lines.append("Skipped: the light tree, as the lamps are cheaper without and alone.")
+    return lines
 
 
 def _install(
@@ -136,7 +177,10 @@ def _swap_overrides(
 def _sentences(conversion: Conversion) -> list[str]:
     lines = []
     if conversion.suns:
-        lines.append(f"Shadows right within {conversion.predicted_error:.2%}, by prediction")
+        lines.append(
+            f"By prediction right within {conversion.predicted_error:.2%} under shadows, "
+            f"{conversion.ground_error:.2%} on level ground"
+        )
     if conversion.residual is not None:
         error = conversion.account.relative_error.max()
         lines.append(f"Account: lamps + world = map within {error:.0e}")

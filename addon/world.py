@@ -124,9 +124,10 @@ def _working_space() -> str:
 
 
 def converted_world(
-    world: bpy.types.World, light: WorldLight, conversion: Conversion
+    world: bpy.types.World, light: WorldLight, conversion: Conversion, camera_sees_it: bool = True
 ) -> bpy.types.World:
-    """A copy of a world in which all rays but the camera's see the residual (or black).
+    """A copy of a world in which all rays but the camera's see the residual (or black), or all
+    rays where the camera does not see it: then Cycles does not load the map.
 
     world: what `light` was found in; when it is a converted one, the copy loses what that
     conversion has put in. Nothing is left behind when this fails.
@@ -145,7 +146,11 @@ def converted_world(
         image = residual_image(residual) if residual is not None else None
         # Between cells nothing is to be blended: a Voronoi map has edges.
         closest = conversion.settings.residual == "voronoi"
-        _insert_residual(tree, texture, image, "Closest" if closest else texture.interpolation)
+        mix = _insert_residual(
+            tree, texture, image, "Closest" if closest else texture.interpolation
+        )
+        if camera_sees_it:
+            _show_camera(mix)
         _set_sampling(new, choose_sampling(residual, conversion.account.share, closest))
     except BaseException:  # whatever it is, it goes on; only the half-made copy goes away
         remove_converted(new)
@@ -170,19 +175,17 @@ def _insert_residual(
     texture: bpy.types.Node,
     image: bpy.types.Image | None,
     interpolation: str,
-) -> None:
-    """Put a mix behind an environment texture: the camera sees it, all else the residual."""
+) -> bpy.types.Node:
+    """Put a mix of an environment texture and the residual behind that texture: the mix, which
+    shows the residual."""
     outgoing = [link.to_socket for link in texture.outputs["Color"].links]
     mix = tree.nodes.new("ShaderNodeMix")
     mix.name = mix.label = "Sunsplit: Camera or Residual"
     mix.data_type, mix.blend_type = "RGBA", "MIX"
     mix.clamp_result = False
     mix.location = texture.location.x + 280, texture.location.y - 60
-    path = tree.nodes.new("ShaderNodeLightPath")
-    path.name = path.label = "Sunsplit: Ray"
-    path.location = texture.location.x, texture.location.y + 320
-    mix[TAG] = path[TAG] = True
-    tree.links.new(path.outputs["Is Camera Ray"], mix.inputs[0])
+    mix[TAG] = True
+    mix.inputs[0].default_value = 0.0
     tree.links.new(texture.outputs["Color"], mix.inputs[7])
     mix.inputs[6].default_value = (0, 0, 0, 1)
     if image is not None:
@@ -191,6 +194,17 @@ def _insert_residual(
         tree.links.new(rest.outputs["Color"], mix.inputs[6])
     for socket in outgoing:
         tree.links.new(mix.outputs[2], socket)
+    return mix
+
+
+def _show_camera(mix: bpy.types.Node) -> None:
+    """Let the camera see the map itself."""
+    tree = mix.id_data
+    path = tree.nodes.new("ShaderNodeLightPath")
+    path.name = path.label = "Sunsplit: Ray"
+    path.location = mix.location.x - 280, mix.location.y + 380
+    path[TAG] = True
+    tree.links.new(path.outputs["Is Camera Ray"], mix.inputs[0])
 
 
 def _texture_like(

@@ -28,7 +28,8 @@ class Conversion:
     suns: brightest first. residual: float32 (height, width, 3) of the width that was asked for,
     or None. samples: what a Voronoi residual was made of, else None. predicted_error: what
     shadows of the suns are wrong by, as a part of the mean irradiance; see `prediction.Prediction`.
-    notes: plain sentences for the user.
+    ground_error: what level ground in the open gets wrong of the worst channel, as a part of its
+    irradiance. notes: plain sentences for the user.
     """
 
     environment: EnvironmentMap
@@ -39,6 +40,7 @@ class Conversion:
     samples: MapOfSamples | None
     account: Account
     predicted_error: float
+    ground_error: float
     notes: tuple[str, ...]
 
 
@@ -81,6 +83,7 @@ def convert(
         samples,
         account,
         chosen.predicted_error,
+        chosen.ground_error,
         notes,
     )
 

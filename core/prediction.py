@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from . import sphere
 from .environment import LUMINANCE_WEIGHTS
 from .patches import Patches
-from .shadow_edges import half_widths
+from .shadow_edges import facing_up, half_widths
 from .suns import Sun, disc_on_ground
 
 Floats = NDArray[np.float64]
@@ -137,7 +137,9 @@ class Prediction:
             wanted -= surfaces.in_the_open().of(unshadowed)
         ground, part = np.full(3, np.nan), 0.0
         if patches is not None:
-            ground = _parts(patches.flux, np.maximum(patches.directions[:, 2], 0))
+            ground = _parts(
+                patches.flux, facing_up(patches.directions, half_widths(patches.spread))
+            )
             part = float((patches.flux @ LUMINANCE_WEIGHTS).sum()) / all_light
         return cls(surfaces, wanted, all_light / 4, ground, part)
 
@@ -146,7 +148,6 @@ class Prediction:
         the light, as a part of the mean irradiance in the open."""
         given = self.surfaces.irradiance(*_pieces(suns)) if len(suns) else 0.0
         return float(np.sqrt(np.mean((given - self.irradiance) ** 2))) / self.mean
-
 
     def wrong_on_ground(self, suns: Sequence[Sun]) -> float:
         """What level ground in the open gets wrong of the worst channel, as a part of all light."""

@@ -58,7 +58,10 @@ def _sun_lines(conversion: Conversion) -> list[str]:
     if len(conversion.suns) > LISTED:
         lines.append(f"       and {len(conversion.suns) - LISTED} more")
     if conversion.suns:
-        lines.append(f"shadows predicted to be right within {conversion.predicted_error:.2%}")
+        lines.append(
+            f"predicted to be right within {conversion.predicted_error:.2%} under shadows, "
+            f"{conversion.ground_error:.2%} on level ground"
+        )
     return [*lines, *conversion.notes]
 
 

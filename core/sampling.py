@@ -80,7 +80,7 @@ def needs_light_tree(suns: Sequence[Sun], light: float) -> bool:
     count = len(flux)
     by_strength = 16 * (flux.sum() ** 2 / 6 - seen) + OTHERWISE
     by_lot = 16 * (count * (flux**2).sum() / 6 - seen) + OTHERWISE
-    return by_strength * (1 + TIME_BY_TREE * count) < by_lot * (1 + TIME_BY_LOT * count)
+    return bool(by_strength * (1 + TIME_BY_TREE * count) < by_lot * (1 + TIME_BY_LOT * count))
 
 
 def contrast(radiance: NDArray[np.float32]) -> tuple[float, float]:

@@ -20,9 +20,9 @@ MOST = {"lights": 10_000, "samples": 50_000, "residual_samples": 20_000}
 """The largest numbers, for which every method is done in a minute or so on a map 1024 wide."""
 
 
-TOLERANCE = 0.5
-"""Predicted error, in percent of the mean irradiance, that the program allows by itself: with twice
-as much the means of pictures were off by up to .9 %, and as many lamps again cost Cycles little."""
+TOLERANCE = 1.0
+"""Predicted error, in percent of the mean irradiance, that the program allows by itself: side by
+side, eyes tell about so much apart."""
 
 OF_OWN_LIGHT = 0.05
 """And as a part of what the suns give: a few faint lights must not become one wide one."""
@@ -44,7 +44,7 @@ class ConversionSettings:
         suns, and what is predicted counts the shadows that the residual lacks.
     lights: at most so many suns, used up where they help, or None: as few as `tolerance` allows.
     tolerance: predicted error in percent of the mean irradiance (see `prediction`), at which no
-        more lights are added; None: .5, and a twentieth of what the suns give, where `lights` is
+        more lights are added; None: 1, and a twentieth of what the suns give, where `lights` is
         None; nothing to stop at otherwise.
     share: the part of all light in region A, 0 to 1, or None: chosen for the map.
         0 leaves the whole map in region B; 1 turns all of it into suns and leaves no residual.

@@ -54,6 +54,15 @@ def let_through(directions: Floats, half_width: Floats, normals: Floats) -> Floa
     return np.clip(part, 0, 1, out=part)
 
 
+def facing_up(directions: Floats, half_width: Floats) -> Floats:
+    """What level ground gets of each piece of light, (n,): the cosine, 0 below the horizon; of a
+    piece that the horizon crosses as much as of a strip of its width."""
+    height = directions[:, 2]
+    above = np.clip(height + half_width, 0, 2 * half_width)
+    crossed = above**2 / (4 * np.maximum(half_width, 1e-300))
+    return np.where(height >= half_width, height, crossed)
+
+
 FINE = 512
 """Steps in which the light across a cell is looked at to place edges."""
 

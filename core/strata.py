@@ -86,7 +86,7 @@ def stratify(environment: EnvironmentMap, share: float | None, count: int) -> St
 
 
 def stratify_at(lum: NDArray[np.float64], threshold: float, count: int) -> Strata:
-    """Cut a map of luminance (height, width) into `count` strata, half of them above a luminance."""
+    """Cut a map of luminance (height, width) into `count` strata, half of them above a border."""
     solid = sphere.row_solid_angles(*lum.shape[::-1])
     if count == 2:
         return Strata(lum, np.array([threshold]), 1 - _part_below(threshold, lum, solid))

@@ -87,7 +87,10 @@ def describe(conversion: Conversion) -> dict[str, Any]:
         "suns": [lights_json.sun_as_dict(sun) for sun in conversion.suns],
         "residual": residual,
         "account": lights_json.account_as_dict(account),
-        "predicted_error": {"shadow_edges_percent": 100 * conversion.predicted_error},
+        "predicted_error": {
+            "shadow_edges_percent": 100 * conversion.predicted_error,
+            "level_ground_percent": 100 * conversion.ground_error,
+        },
         "notes": [*environment.warnings, *conversion.notes],
     }
 

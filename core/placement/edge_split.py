@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..environment import LUMINANCE_WEIGHTS
 from ..patches import Patches
 from ..settings import Shape
-from ..shadow_edges import cap_beyond, edges_across, half_widths, let_through
+from ..shadow_edges import cap_beyond, edges_across, facing_up, half_widths, let_through
 from ..suns import disc_diameter, disc_on_ground
 
 Floats = NDArray[np.float64]
@@ -183,7 +183,7 @@ class _Light:
     @cached_property
     def on_ground(self) -> Floats:
         """What level ground gets of each patch: the cosine, 0 below the horizon, (p,)."""
-        return np.maximum(self.patches.directions[:, 2], 0)
+        return facing_up(self.patches.directions, self.half_width)
 
     def squared_error(self, members: NDArray[np.intp]) -> float:
         """Mean over all great circles of what the cell's disc lets through too much or too little,

@@ -38,8 +38,9 @@ class Placement:
         return _nearest_sites(self.light, self.sites) if self.given is None else self.given
 
 
-ON_GROUND = 0.6
-"""So much of a tolerance is allowed on level ground."""
+ON_GROUND = 0.3
+"""So much of a tolerance is allowed on level ground: what it gets wrong is wrong all over a
+picture, not only at shadows' edges."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +58,7 @@ class ChosenSuns:
 
     @property
     def worst(self) -> float:
-        """What a tolerance is held against. What level ground gets wrong is wrong all over a
-        picture, and counts more."""
+        """What a tolerance is held against."""
         return max(self.predicted_error, self.ground_error / ON_GROUND)
 
 

@@ -3,8 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sunsplit.core.sampling import WorldSampling, choose_sampling, contrast
-from tests.maps import sky
+from sunsplit.core.sampling import (
+    WorldSampling,
+    choose_sampling,
+    contrast,
+    needs_light_tree,
+)
+from sunsplit.core.suns import point_sun
+from tests.maps import direction, sky
 
 
 def test_contrast_of_a_constant_map():
@@ -43,3 +49,23 @@ def test_cells_get_a_table_as_wide_as_their_map():
     pixels[20:22, 5:9] = 900
     assert choose_sampling(pixels, 0, cells=True) == WorldSampling("MANUAL", 128)
     assert choose_sampling(sky(64, 0.7).astype(np.float32), 0, cells=True).method == "NONE"
+
+
+def some_suns(strengths):
+    around = np.linspace(0, 5, len(strengths))
+    return [
+        point_sun(np.full(3, strength), direction(np.degrees(turn), 30), 2)
+        for strength, turn in zip(strengths, around, strict=True)
+    ]
+
+
+@pytest.mark.parametrize(("strengths", "needed"), [([1], False), ([1] * 12, False), ([9, 1], True)])
+def test_suns_that_are_alike_need_no_light_tree(strengths, needed):
+    assert needs_light_tree(some_suns(strengths), sum(strengths) * 1.5) is needed
+
+
+def test_dozens_of_suns_are_drawn_by_lot_if_the_tree_costs_more_than_noise():
+    strengths = np.linspace(1, 2, 60)
+    assert not needs_light_tree(some_suns(strengths), strengths.sum())
+    strengths[0] = 60
+    assert needs_light_tree(some_suns(strengths), strengths.sum())

@@ -1,0 +1,188 @@
+"""What a scene does not need is skipped, said, and brought back."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from sunsplit.addon.scene_needs import ALL, LIGHTING_WIDTH, SceneNeeds, needs_of
+from tests.blender import (
+    add_mesh,
+    box_mesh,
+    camera_towards,
+    diffuse,
+    fresh_scene,
+    hdri_world,
+    material,
+    node,
+    plate_mesh,
+    suns,
+)
+
+
+@pytest.fixture
+def scene(sunrise):
+    """A box to stand in, half a metre above its floor, and the camera in it."""
+    made = fresh_scene()
+    hdri_world(made, sunrise)
+    add_mesh(made, box_mesh(2, 2, 1), diffuse("Wall", 0.5), Matrix.Translation((0, 0, -0.5)))
+    camera_towards(made, np.array([1, 0, 0]), 60, 32)
+    return made
+
+
+def sees_world(scene) -> bool:
+    bpy.context.view_layer.update()
+    return needs_of(scene).camera_sees_world
+
+
+def test_in_a_box_nothing_is_needed(scene):
+    assert needs_of(scene) == SceneNeeds(False, False, False)
+
+
+def break_wall(scene):
+    mesh = next(thing for thing in scene.objects if thing.type == "MESH").data
+    mesh.clear_geometry()
+
+
+def open_wall(scene):
+    wall = next(thing for thing in scene.objects if thing.type == "MESH")
+    wall.hide_render = True
+
+
+def move_camera_out(scene):
+    scene.camera.location = (9, 0, 0)
+
+
+def animate_camera(scene):
+    scene.camera.keyframe_insert("location", frame=1)
+
+
+def make_glass_pane(scene):
+    pane = material("Pane", (1, 1, 1), Alpha=0.5)
+    add_mesh(scene, plate_mesh(0.1), pane, Matrix.Translation((0, 0, 0.3)))
+
+
+def look_around(scene):
+    scene.camera.data.type = "PANO"
+
+
+def have_no_camera(scene):
+    scene.camera = None
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        break_wall,
+        open_wall,
+        move_camera_out,
+        animate_camera,
+        make_glass_pane,
+        look_around,
+        have_no_camera,
+    ],
+)
+def test_a_camera_that_may_see_the_world(scene, change):
+    assert not sees_world(scene)
+    change(scene)
+    assert sees_world(scene)
+
+
+def test_a_transparent_film_shows_no_world(scene):
+    move_camera_out(scene)
+    scene.render.film_transparent = True
+    assert not sees_world(scene)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "sharp"),
+    [
+        ({"Roughness": 0.5}, False),
+        ({"Roughness": 0.1}, True),
+        ({"Roughness": 0.5, "Coat_Weight": 0.3}, True),
+        ({"Roughness": 0.5, "Coat_Weight": 0.3, "Coat_Roughness": 0.4}, False),
+    ],
+)
+def test_what_mirrors_sharply(scene, inputs, sharp):
+    made = material("New", (1, 1, 1), **inputs)
+    add_mesh(scene, plate_mesh(0.1), made, Matrix())
+    assert needs_of(scene).mirrors is sharp
+
+
+def test_a_roughness_that_cannot_be_told_is_sharp(scene):
+    made = material("New", (1, 1, 1), Roughness=0.5)
+    noise = made.node_tree.nodes.new("ShaderNodeTexNoise")
+    shader = node(made.node_tree, "BSDF_PRINCIPLED")
+    made.node_tree.links.new(noise.outputs[0], shader.inputs["Roughness"])
+    add_mesh(scene, plate_mesh(0.1), made, Matrix())
+    assert needs_of(scene).mirrors
+
+
+def test_glowing_things_and_lamps_are_other_lights(scene):
+    assert not needs_of(scene).other_lights
+    glowing = material("New", (1, 1, 1), Emission_Strength=2)
+    plate = add_mesh(scene, plate_mesh(0.1), glowing, Matrix())
+    assert needs_of(scene).other_lights
+    plate.hide_render = True
+    assert not needs_of(scene).other_lights
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    scene.collection.objects.link(lamp)
+    assert needs_of(scene).other_lights
+
+
+@pytest.mark.parametrize(
+    ("width", "lighting"),
+    [
+        (512, None),
+        (1024, None),
+        (2048, 1024),
+        (8192, 1024),
+        (16384, 1024),
+        (3000, 1000),
+        (2 * 4099, 2),
+    ],
+)
+def test_a_map_that_only_lights_is_a_whole_part_of_the_map(width, lighting):
+    needs = SceneNeeds(camera_sees_world=True, mirrors=False, other_lights=False)
+    found = needs.residual_width(width)
+    if lighting == 2:
+        assert found is None or (found % 2 == 0 and width % found == 0)
+    else:
+        assert found == lighting
+    assert found is None or found <= LIGHTING_WIDTH
+    assert ALL.residual_width(width) is None
+
+
+def test_skipped_things_are_said_and_brought_back(scene):
+    scene.cycles.use_light_tree = True
+    bpy.ops.sunsplit.convert(lights=1)
+    assert "the camera does not see the world" in scene.sunsplit.report
+    assert "the light tree" in scene.sunsplit.report
+    assert not scene.cycles.use_light_tree
+    mix = next(n for n in scene.world.node_tree.nodes if n.type == "MIX")
+    assert not mix.inputs[0].is_linked
+    assert mix.inputs[0].default_value == 0
+    bpy.ops.sunsplit.convert(lights=1)
+    assert "the light tree" in scene.sunsplit.report
+    assert len(suns(scene)) == 1
+    bpy.ops.sunsplit.restore()
+    assert scene.cycles.use_light_tree
+
+
+def test_a_light_tree_that_was_off_stays_off(scene):
+    scene.cycles.use_light_tree = False
+    bpy.ops.sunsplit.convert(lights=1)
+    assert "the light tree" not in scene.sunsplit.report
+    bpy.ops.sunsplit.restore()
+    assert not scene.cycles.use_light_tree
+
+
+def test_one_switch_keeps_everything(scene):
+    scene.cycles.use_light_tree = True
+    bpy.ops.sunsplit.convert(lights=1, skips=False)
+    assert "Skipped" not in scene.sunsplit.report
+    assert scene.cycles.use_light_tree
+    mix = next(n for n in scene.world.node_tree.nodes if n.type == "MIX")
+    assert mix.inputs[0].is_linked
