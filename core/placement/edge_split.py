@@ -24,8 +24,12 @@ from ..suns import disc_diameter, disc_on_ground
 
 Floats = NDArray[np.float64]
 
-TURNS, PLACES = 6, 48
-"""Edges across a cell: at so many angles, in so many places each."""
+TURNS, PLACES = 6, 24
+"""Edges across a cell: at so many angles, in so many places each. With 48 places the errors of 4 to
+256 lights are the same, and 64 take a fifth longer."""
+
+MANY, FEWER = 2048, 16
+"""Cells of more patches than this are cut anyway: so many places tell how soon."""
 
 SEEN_BY = np.array([1.0, 0.01, 1.2])
 """Of red, green and blue, what a cell's mean direction and width are made of.
@@ -194,7 +198,8 @@ class _Light:
         to_light, shortfall = _moments(
             directions, patches.spread[members], weight, np.zeros(len(members), np.intp), 1
         )
-        normals, parts = edges_across(directions, weight, to_light[0], TURNS, PLACES)
+        places = PLACES if len(members) <= MANY else FEWER
+        normals, parts = edges_across(directions, weight, to_light[0], TURNS, places)
         seen = let_through(directions, self.half_width[members], normals)
         height = normals @ to_light[0]
         half = 0.0 if self.shape == "point" else disc_diameter(float(shortfall[0])) / 2
