@@ -47,7 +47,7 @@ def test_a_png_of_the_promised_size(tmp_path, width):
     [(60, 40), (-120, -35), (0, 0), (180, 10), (179, -20), (-178, 45)],
 )
 def test_circle_and_marker_lie_around_the_sun(azimuth, elevation):
-    conversion = convert(lit_from(azimuth, elevation))
+    conversion = convert(lit_from(azimuth, elevation), ConversionSettings(lights=1))
     (sun,) = conversion.suns
     mask = sun_pixels(draw_preview(conversion))
     angles = reach(mask, azimuth, elevation)

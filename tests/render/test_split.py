@@ -72,7 +72,8 @@ def test_a_white_plate(tmp_path, hdri, normal):
     camera.location = Vector(normal) * 2
     expected = 0.8 / np.pi * irradiance(hdri, normal)
     plain = estimate(scene, tmp_path, 48)
-    bpy.ops.sunsplit.convert()
+    # By default a plate may be off by as much as is looked for here: what faces down sees little.
+    bpy.ops.sunsplit.convert(tolerance=0.3)
     split = estimate(scene, tmp_path, 48)
     means_agree(plain, split, tmp_path)
     found = split.mean.mean(axis=(0, 1))
