@@ -134,7 +134,7 @@ def _skipped(
     """What was left out, and why."""
     lines = []
     width = conversion.settings.residual_width
-    if width != settings.residual_width:
+    if conversion.residual is not None and width != settings.residual_width:
         lines.append(
             f"Skipped: nothing mirrors sharply, so the world that lights is {width} pixels wide "
             f"instead of {conversion.environment.width}."

@@ -5,13 +5,11 @@ Whatever cannot be told is needed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import bpy
 from mathutils import Vector
-
-from .trace import TAG
 
 SHARP = 0.25
 """Roughness below which a surface may show single pixels of a wide map."""
@@ -22,6 +20,12 @@ degree, as far as rougher surfaces and shadows can tell."""
 
 RAYS = 48, 27
 """Rays through a camera's picture that look for the world."""
+
+DEFORMING = {
+    *("ARMATURE", "BUILD", "CLOTH", "DYNAMIC_PAINT", "EXPLODE", "FLUID", "MESH_CACHE"),
+    *("MESH_SEQUENCE_CACHE", "NODES", "OCEAN", "PARTICLE_SYSTEM", "SOFT_BODY", "WAVE"),
+}
+"""Modifiers that may move a surface without a key on it."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +42,8 @@ class SceneNeeds:
         """Of the map that lights, for a map of this width; None: as wide."""
         if self.mirrors or width <= LIGHTING_WIDTH:
             return None
-        parts = range(-(-width // LIGHTING_WIDTH), width // 2)
-        return next((width // n for n in parts if not width % n and not width // n % 2), None)
+        narrower = range(LIGHTING_WIDTH, LIGHTING_WIDTH // 2 - 1, -2)
+        return next((part for part in narrower if width % part == 0), None)
 
 
 ALL = SceneNeeds(camera_sees_world=True, mirrors=True, other_lights=True)
@@ -48,19 +52,34 @@ ALL = SceneNeeds(camera_sees_world=True, mirrors=True, other_lights=True)
 
 def needs_of(scene: bpy.types.Scene) -> SceneNeeds:
     """Look at a scene: its camera, lamps and materials."""
-    shown = [thing for thing in scene.objects if not thing.hide_render]
-    nodes = [node for tree in _trees(shown) for node in _nodes(tree)]
+    shown = list(_shown(scene.objects))
+    trees = _trees(scene, shown)
+    nodes = [node for tree in trees for node in _nodes(tree)]
+    if any(tree.animation_data for tree in trees) or any(node.type == "SCRIPT" for node in nodes):
+        return ALL
+    own = {entry.lamp for entry in scene.sunsplit.lamps}
     return SceneNeeds(
         camera_sees_world=_sees_world(scene, shown, nodes),
         mirrors=any(_is_sharp(node) for node in nodes),
-        other_lights=any(thing.type == "LIGHT" and not thing.get(TAG) for thing in shown)
+        other_lights=any(thing.type == "LIGHT" and thing not in own for thing in shown)
         or any(_shines(node) for node in nodes),
     )
 
 
-def _trees(shown: list[bpy.types.Object]) -> list[bpy.types.NodeTree]:
-    """Of the materials of things that are rendered, instances' and overriding ones too."""
-    found = {
+def _shown(things: Iterable[bpy.types.Object]) -> Iterator[bpy.types.Object]:
+    """Things that renders may show, and those in collections that they are instances of."""
+    for thing in things:
+        if not thing.hide_render:
+            yield thing
+            if thing.instance_collection:
+                yield from _shown(thing.instance_collection.all_objects)
+
+
+def _trees(scene: bpy.types.Scene, shown: list[bpy.types.Object]) -> list[bpy.types.NodeTree]:
+    """Of the materials that things may wear, those of instances and overrides too."""
+    overrides = [layer.material_override for layer in scene.view_layers]
+    found = {made.node_tree: None for made in overrides if made and made.node_tree}
+    found |= {
         slot.material.node_tree: None
         for thing in shown
         for slot in thing.material_slots
@@ -86,7 +105,8 @@ def _is_above(node: bpy.types.Node, name: str, value: float) -> bool:
 
 
 def _shines(node: bpy.types.Node) -> bool:
-    return node.type == "EMISSION" or _is_above(node, "Emission Strength", 0)
+    glow = ("Emission Strength", "Blackbody Intensity")
+    return node.type == "EMISSION" or any(_is_above(node, name, 0) for name in glow)
 
 
 def _is_sharp(node: bpy.types.Node) -> bool:
@@ -106,7 +126,9 @@ def _is_seen_through(node: bpy.types.Node) -> bool:
     if node.type == "BSDF_PRINCIPLED":
         alpha = node.inputs["Alpha"]
         return alpha.is_linked or alpha.default_value < 1
-    return node.type in ("BSDF_TRANSPARENT", "HOLDOUT")
+    if node.type == "OUTPUT_MATERIAL":  # of a volume without a surface
+        return not node.inputs["Surface"].is_linked
+    return node.type in ("BSDF_TRANSPARENT", "BSDF_RAY_PORTAL", "HOLDOUT")
 
 
 def _sees_world(
@@ -119,7 +141,11 @@ def _sees_world(
     camera = scene.camera
     if camera is None or camera.type != "CAMERA" or camera.data.type != "PERSP":
         return True
-    if any(marker.camera for marker in scene.timeline_markers):
+    if any(marker.camera for marker in scene.timeline_markers) or scene.render.use_multiview:
+        return True
+    if len(scene.view_layers) > 1 or any(_is_otherwise_in_renders(thing) for thing in shown):
+        return True
+    if any(made.hide_render for made in scene.collection.children_recursive):
         return True
     if any(_moves(thing) for thing in (camera, camera.data, *shown)):
         return True
@@ -131,12 +157,22 @@ def _sees_world(
     return not all(_is_stopped(scene, graph, camera, ray) for ray in _rays(scene, camera))
 
 
+def _is_otherwise_in_renders(thing: bpy.types.Object) -> bool:
+    """Whether rays through the viewport's scene may meet another shape than a render's."""
+    return any(part.show_render != part.show_viewport for part in thing.modifiers)
+
+
 def _moves(thing: bpy.types.Object | bpy.types.Camera) -> bool:
     made = thing.animation_data
     if made and (made.action or len(made.drivers) or len(made.nla_tracks)):
         return True
     if not isinstance(thing, bpy.types.Object):
         return False
+    if any(part.type in DEFORMING for part in thing.modifiers):
+        return True
+    keys = getattr(thing.data, "shape_keys", None)
+    if keys and keys.animation_data:
+        return True
     return bool(thing.constraints or thing.rigid_body or (thing.parent and _moves(thing.parent)))
 
 

@@ -7,7 +7,7 @@ one sample of each has, in squares of the mean irradiance, the mean variance
     suns:      16 (F_A^2 / 6 - K_A) / F^2              F: light, the integral of L
     residual:  16 (pi/4 * integral of R^2 - K_B) / F^2   K: mean square of the irradiance
 
-Renders are less noisy by a factor of 2 to 6, but least noisy for the same border
+Renders are less noisy than that, but least noisy for about the same border
 (docs/benchmarks/region_a.md).
 """
 
@@ -73,8 +73,9 @@ def mean_square_irradiance(coefficients: Floats) -> Floats:
     return ((coefficients * _LOBE) ** 2).sum(axis=-1) / (4 * np.pi)
 
 
-def _of_one_place(coefficients: Floats) -> Floats:
-    """The same if all of that light came from one place: a sixth of it squared, in all orders."""
+def square_from_one_place(coefficients: Floats) -> Floats:
+    """The same if all of that light came from one place: a sixth of it squared, but for what
+    higher orders hold."""
     light = coefficients[..., 0] * np.sqrt(4 * np.pi)
     per_order = np.array([1, 3, 5]) @ _LOBE[[0, 1, 4]] ** 2 / (4 * np.pi) ** 2
     return light**2 * per_order
@@ -136,7 +137,7 @@ def borders(lum: Floats, solid: Floats) -> Borders:
     unit = 16 / light**2
     return Borders(
         level,
-        unit * (_of_one_place(suns) - mean_square_irradiance(suns)),
+        unit * (square_from_one_place(suns) - mean_square_irradiance(suns)),
         unit * (np.pi / 4 * (weight @ flat**2 - above) - mean_square_irradiance(rest)),
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .environment import LUMINANCE_WEIGHTS, luminance
-from .noise import OTHERWISE, harmonics, mean_square_irradiance
+from .noise import OTHERWISE, harmonics, mean_square_irradiance, square_from_one_place
 from .sphere import row_solid_angles
 from .suns import Sun
 
@@ -75,11 +75,11 @@ def needs_light_tree(suns: Sequence[Sun], light: float) -> bool:
     if len(suns) <= 1:
         return False
     flux = np.array([sun.scalar_irradiance for sun in suns]) @ LUMINANCE_WEIGHTS / light
-    shine = flux @ harmonics(np.array([sun.to_light for sun in suns]))
-    seen = float(mean_square_irradiance(shine))
-    count = len(flux)
-    by_strength = 16 * (flux.sum() ** 2 / 6 - seen) + OTHERWISE
-    by_lot = 16 * (count * (flux**2).sum() / 6 - seen) + OTHERWISE
+    each = flux[:, None] * harmonics(np.array([sun.to_light for sun in suns]))
+    together, count = each.sum(axis=0), len(suns)
+    seen = mean_square_irradiance(together)
+    by_strength = 16 * (square_from_one_place(together) - seen) + OTHERWISE
+    by_lot = 16 * (count * square_from_one_place(each).sum() - seen) + OTHERWISE
     return bool(by_strength * (1 + TIME_BY_TREE * count) < by_lot * (1 + TIME_BY_LOT * count))
 
 

@@ -19,7 +19,9 @@ from tests.blender import (
     node,
     plate_mesh,
     suns,
+    write_map,
 )
+from tests.maps import direction, paint_disc, sky
 
 
 @pytest.fixture
@@ -64,6 +66,33 @@ def make_glass_pane(scene):
     add_mesh(scene, plate_mesh(0.1), pane, Matrix.Translation((0, 0, 0.3)))
 
 
+def fill_with_fog(scene):
+    fog = bpy.data.materials.new("Fog")
+    if bpy.app.version < (5, 0):
+        fog.use_nodes = True
+    tree = fog.node_tree
+    tree.nodes.clear()
+    volume = tree.nodes.new("ShaderNodeVolumeScatter")
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(volume.outputs[0], output.inputs["Volume"])
+    open_wall(scene)
+    add_mesh(scene, box_mesh(2, 2, 1), fog, Matrix.Translation((0, 0, -0.5)))
+
+
+def hide_collection_of_walls(scene):
+    wall = next(thing for thing in scene.objects if thing.type == "MESH")
+    hidden = bpy.data.collections.new("Hidden")
+    scene.collection.children.link(hidden)
+    scene.collection.objects.unlink(wall)
+    hidden.objects.link(wall)
+    hidden.hide_render = True
+
+
+def build_wall_slowly(scene):
+    wall = next(thing for thing in scene.objects if thing.type == "MESH")
+    wall.modifiers.new("Build", "BUILD").frame_duration = 1
+
+
 def look_around(scene):
     scene.camera.data.type = "PANO"
 
@@ -80,6 +109,9 @@ def have_no_camera(scene):
         move_camera_out,
         animate_camera,
         make_glass_pane,
+        fill_with_fog,
+        hide_collection_of_walls,
+        build_wall_slowly,
         look_around,
         have_no_camera,
     ],
@@ -132,6 +164,37 @@ def test_glowing_things_and_lamps_are_other_lights(scene):
     assert needs_of(scene).other_lights
 
 
+def test_a_lamp_in_an_instanced_collection_is_another_light(scene):
+    lamps = bpy.data.collections.new("Lamps")
+    lamps.objects.link(bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "SUN")))
+    instance = bpy.data.objects.new("Instance", None)
+    instance.instance_type, instance.instance_collection = "COLLECTION", lamps
+    scene.collection.objects.link(instance)
+    assert needs_of(scene).other_lights
+
+
+def test_a_copied_lamp_is_another_light(scene):
+    bpy.ops.sunsplit.convert(lights=1)
+    assert not needs_of(scene).other_lights
+    scene.collection.objects.link(suns(scene)[0].copy())
+    assert needs_of(scene).other_lights
+
+
+def test_a_material_that_overrides_all_others_counts(scene):
+    chrome = material("Chrome", (1, 1, 1), Metallic=1.0, Roughness=0.0)
+    assert not needs_of(scene).mirrors
+    scene.view_layers[0].material_override = chrome
+    assert needs_of(scene).mirrors
+
+
+def test_an_animated_material_may_become_anything(scene):
+    made = material("New", (1, 1, 1), Roughness=0.5)
+    add_mesh(scene, plate_mesh(0.1), made, Matrix())
+    shader = node(made.node_tree, "BSDF_PRINCIPLED")
+    shader.inputs["Roughness"].keyframe_insert("default_value", frame=1)
+    assert needs_of(scene) == ALL
+
+
 @pytest.mark.parametrize(
     ("width", "lighting"),
     [
@@ -141,18 +204,27 @@ def test_glowing_things_and_lamps_are_other_lights(scene):
         (8192, 1024),
         (16384, 1024),
         (3000, 1000),
-        (2 * 4099, 2),
+        (3026, None),  # a whole part of it would be 178 wide
+        (2 * 4099, None),
     ],
 )
 def test_a_map_that_only_lights_is_a_whole_part_of_the_map(width, lighting):
     needs = SceneNeeds(camera_sees_world=True, mirrors=False, other_lights=False)
-    found = needs.residual_width(width)
-    if lighting == 2:
-        assert found is None or (found % 2 == 0 and width % found == 0)
-    else:
-        assert found == lighting
-    assert found is None or found <= LIGHTING_WIDTH
+    assert needs.residual_width(width) == lighting
     assert ALL.residual_width(width) is None
+
+
+def test_a_wide_map_lights_with_a_narrower_one(scene, tmp_path):
+    pixels = sky(2048, 0.3)
+    paint_disc(pixels, direction(0, 40), 2, (900, 800, 700))
+    hdri_world(scene, write_map(tmp_path / "wide.exr", pixels))
+    for skips, width in ((True, LIGHTING_WIDTH), (False, 2048)):
+        bpy.ops.sunsplit.convert(lights=1, skips=skips)
+        tree = scene.world.node_tree
+        assert tree.nodes["Sunsplit: Residual"].image.size[0] == width
+        assert ("1024 pixels wide instead of 2048" in scene.sunsplit.report) is skips
+    bpy.ops.sunsplit.convert(share=1.0, lights=4)
+    assert "pixels wide" not in scene.sunsplit.report
 
 
 def test_skipped_things_are_said_and_brought_back(scene):

@@ -1,4 +1,4 @@
-"""Table and plot of the benchmark `equal_error`."""
+"""Table of the benchmark `equal_error`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def write(curves: Sequence[Curve], folder: Path) -> None:
-    """equal_error.md and equal_error.png."""
+    """equal_error.md."""
     from tests.benchmarks.equal_error import PLAIN, SPLIT, TARGETS
 
     pairs = list(dict.fromkeys((c.map, c.scene) for c in curves))
