@@ -6,6 +6,8 @@ through what has h . w > 0; of a uniform cap it lets through a part that is know
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,18 +44,6 @@ def half_widths(spread: Floats) -> Floats:
     return np.sqrt(3 * spread)
 
 
-def let_through(directions: Floats, half_width: Floats, normals: Floats) -> Floats:
-    """Part of each piece of light on the side of each edge, (n, m), 0 to 1.
-
-    A piece that an edge crosses lets through as much as a strip of its width: as a point it would
-    be hidden or not, and a sun of one pixel could not be told from a point.
-    """
-    part = directions @ normals.T
-    part /= 2 * half_width[:, None]
-    part += 0.5
-    return np.clip(part, 0, 1, out=part)
-
-
 def facing_up(directions: Floats, half_width: Floats) -> Floats:
     """What level ground gets of each piece of light, (n,): the cosine, 0 below the horizon; of a
     piece that the horizon crosses as much as of a strip of its width."""
@@ -63,40 +53,185 @@ def facing_up(directions: Floats, half_width: Floats) -> Floats:
     return np.where(height >= half_width, height, crossed)
 
 
-FINE = 512
-"""Steps in which the light across a cell is looked at to place edges."""
+STEPS = 128
+"""Steps across a cell in which light is summed to see how much lies beyond an edge."""
+
+
+AT_ONCE = 1 << 14
+"""Pieces of light times angles that are held in memory at a time: few enough for a processor's own
+memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """Edges that cross each of n cells of light, e of each.
+
+    height: h . c of an edge's normal and the cell's centre, (n, e). part: of all great circles that
+    each edge stands for; those that miss the cell are in none, (n, e). beyond: light that an edge
+    lets through of each channel, (n, e, channels).
+    """
+
+    height: Floats
+    part: Floats
+    beyond: Floats
 
 
 def edges_across(
-    directions: Floats, weight: Floats, centre: Floats, turns: int, places: int
-) -> tuple[Floats, Floats]:
-    """Edges that cross some light, and what part of all great circles each stands for.
+    directions: Floats,
+    half_width: Floats,
+    light: Floats,
+    owner: NDArray[np.intp],
+    centres: Floats,
+    turns: int,
+    places: int,
+) -> Crossings:
+    """Edges at `turns` angles in `places` positions each, half of these spread evenly from one end
+    of a cell to the other, half where its light is.
 
-    directions: (n, 3), weight: (n,). Edges at `turns` angles and `places` positions each, half of
-    them spread evenly from one end of the light to the other, half where the light is. Returns
-    normals (turns * places, 3) and weights; edges that miss the light are in neither.
+    directions: of pieces of light, (p, 3), sorted by their owner. half_width: of each in radians,
+    (p,): an edge that crosses a piece lets through a part of it, as of a strip; as a point it would
+    be hidden or not, and a sun of one pixel could not be told from a point. light: (p, channels).
+    owner: the cell of each, rising from 0, each has one. centres: unit vectors, (n, 3).
     """
+    cells = _Cells.of(directions, half_width, light, owner, centres)
     turn = np.arange(turns) * (np.pi / turns)
-    first, second = sphere.tangents(centre)
-    across = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * second
-    forward = directions @ centre
-    angle = np.arctan((across @ directions.T) / np.where(forward == 0, 1e-300, forward))
-    low, high = angle.min(axis=1), angle.max(axis=1)
+    at_once = max(AT_ONCE // len(owner), 1)
+    found = [
+        _turned_edges(cells, turn[start : start + at_once], places)
+        for start in range(0, turns, at_once)
+    ]
+    height, part, beyond = (np.concatenate(arrays, axis=1) for arrays in zip(*found, strict=True))
+    return Crossings(height, part / turns, beyond)
+
+
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """Pieces of light as their cells' centres see them.
+
+    first, second, forward: where they are, along two axes across and one to the centre, (p,).
+    signed: light of each channel, less than nothing behind the observer's back, and then all of it,
+    (channels + 1, p). starts: of each cell, (n,). behind: light behind that back, (n, channels).
+    """
+
+    first: Floats
+    second: Floats
+    forward: Floats
+    half_width: Floats
+    signed: Floats
+    owner: NDArray[np.intp]
+    starts: NDArray[np.intp]
+    behind: Floats
+
+    @classmethod
+    def of(
+        cls,
+        directions: Floats,
+        half_width: Floats,
+        light: Floats,
+        owner: NDArray[np.intp],
+        centres: Floats,
+    ) -> _Cells:
+        count = len(centres)
+        axes = np.stack([*sphere.tangents(centres), centres], axis=-1)[owner]
+        first, second, forward = np.einsum("pc,pca->ap", directions, axes)
+        back = forward < 0
+        signed = np.concatenate([light.T, light.sum(axis=1)[None]])
+        behind = np.zeros((count, light.shape[1]))
+        if back.any():
+            for channel in range(light.shape[1]):
+                behind[:, channel] = np.bincount(owner[back], light[back, channel], count)
+            signed[:-1, back] *= -1
+        starts = np.searchsorted(owner, np.arange(count))
+        return cls(first, second, forward, half_width, signed, owner, starts, behind)
+
+
+def _turned_edges(cells: _Cells, turn: Floats, places: int) -> tuple[Floats, Floats, Floats]:
+    """Heights, parts and light beyond of edges at some angles, (n, e, ...); see `Crossings`."""
+    owner, count, turns = cells.owner, len(cells.starts), len(turn)
+    aside = np.cos(turn)[:, None] * cells.first
+    aside += np.sin(turn)[:, None] * cells.second
+    # Edges turn about an axis through the observer: half the angle's tangent is the place.
+    reach = np.sqrt(aside * aside + cells.forward**2)
+    place = aside
+    place /= reach + np.abs(cells.forward)
+    place[:, cells.forward < 0] *= -1
+    width = cells.half_width * (1 + place * place) / (2 * np.maximum(reach, 1e-3))
+    low = np.minimum.reduceat(place - width, cells.starts, axis=1)
+    high = np.maximum.reduceat(place + width, cells.starts, axis=1)
     # So that an edge on either side lets all through, or nothing.
-    margin = 0.03 * (high - low) + 0.004
-    low, high = np.maximum(low - margin, -np.pi / 2), np.minimum(high + margin, np.pi / 2)
-    step = (high - low) / FINE
-    place = ((angle - low[:, None]) / step[:, None]).astype(np.intp)
-    np.minimum(place, FINE - 1, out=place)
-    place += (FINE * np.arange(turns))[:, None]
-    light = np.bincount(place.ravel(), np.tile(weight, turns), FINE * turns).reshape(turns, FINE)
-    dense = np.zeros((turns, FINE + 1))
-    np.cumsum(0.5 / FINE + light * (0.5 / weight.sum()), axis=1, out=dense[:, 1:])
-    wanted, steps = np.arange(places + 1) / places, np.arange(FINE + 1)
-    ends = np.stack([np.interp(wanted, one, steps) for one in dense])
-    ends = low[:, None] + step[:, None] * ends
-    middle = (ends[:, 1:] + ends[:, :-1]) / 2
-    cosine = np.cos(middle)
-    normals = cosine[..., None] * across[:, None] - np.sin(middle)[..., None] * centre
-    weights = cosine * (ends[:, 1:] - ends[:, :-1]) / (2 * turns)
-    return normals.reshape(-1, 3), weights.ravel()
+    margin = 0.03 * (high - low) + 0.002
+    low, high = np.maximum(low - margin, -1), np.minimum(high + margin, 1)
+    step = (high - low) / STEPS
+    place -= low[:, owner]
+    place /= step[:, owner]
+    width /= step[:, owner]
+    sums = _sums_before(place, width, cells.signed, owner, count)
+    sums = sums.reshape(turns, count, STEPS + 1, -1)
+    ends = _places(sums[..., -1], places)
+    middle = (ends[..., 1:] + ends[..., :-1]) / 2
+    # Behind the observer's back an edge lets through what lies before it.
+    beyond = sums[..., -1:, :-1] - _between(sums[..., :-1], middle)
+    beyond += cells.behind[:, None, :]
+    ends = 2 * np.arctan(low[..., None] + step[..., None] * ends)
+    angle = 2 * np.arctan(low[..., None] + step[..., None] * middle)
+    part = np.cos(angle) * (ends[..., 1:] - ends[..., :-1]) / 2
+
+    def by_cell(values: Floats) -> Floats:
+        return np.moveaxis(values, 0, 1).reshape(count, turns * places, *values.shape[3:])
+
+    return by_cell(-np.sin(angle)), by_cell(part), by_cell(beyond)
+
+
+def _sums_before(
+    place: Floats, width: Floats, light: Floats, owner: NDArray[np.intp], count: int
+) -> Floats:
+    """Light before each step, (turns * count, STEPS + 1, channels).
+
+    place, width: of strips of light in steps, (turns, p): the middle and half of the width.
+    light: (channels, p).
+    """
+    turns, channels = len(place), len(light)
+    row = ((np.arange(turns) * count)[:, None] + owner) * (STEPS + 1)
+    # To the nearest steps: strips are many, or much wider than one.
+    low = np.clip(place - width + 0.5, 0, STEPS - 1).astype(np.intp)
+    high = np.clip((place + width + 0.5).astype(np.intp), low + 1, STEPS)
+    slope = 1 / (high - low)
+    low += row
+    high += row
+    sums = np.empty((turns * count, STEPS + 1, channels))
+    for channel in range(channels):
+        # The sum's second difference: up where a strip begins, down where it ends.
+        part = (slope * light[channel]).ravel()
+        bent = np.bincount(low.ravel(), part, turns * count * (STEPS + 1))
+        bent -= np.bincount(high.ravel(), part, len(bent))
+        twice = bent.reshape(-1, STEPS + 1).cumsum(axis=1).cumsum(axis=1)
+        sums[:, 0, channel] = 0
+        sums[:, 1:, channel] = twice[:, :-1]
+    return sums
+
+
+def _places(sums: Floats, places: int) -> Floats:
+    """Where positions of edges end, in steps: half of them even, half by light, (..., places + 1).
+
+    sums: of light before each step, (..., STEPS + 1).
+    """
+    shape = sums.shape[:-1]
+    whole = np.maximum(sums[..., -1:], 1e-300)
+    dense = (0.5 * sums / whole + np.linspace(0, 0.5, STEPS + 1)).reshape(-1, STEPS + 1)
+    dense[:, 0], dense[:, -1] = 0, 1
+    row = 2.0 * np.arange(len(dense))[:, None]
+    wanted = np.arange(places + 1) / places
+    after = np.searchsorted((dense + row).ravel(), (wanted + row).ravel()).reshape(len(dense), -1)
+    after = np.clip(after - np.arange(len(dense))[:, None] * (STEPS + 1), 1, STEPS)
+    low = np.take_along_axis(dense, after - 1, axis=1)
+    high = np.take_along_axis(dense, after, axis=1)
+    return (after - 1 + (wanted - low) / (high - low)).reshape(*shape, places + 1)
+
+
+def _between(sums: Floats, at: Floats) -> Floats:
+    """Values at places between steps, (..., places, channels)."""
+    step = np.minimum(at.astype(np.intp), STEPS - 1)
+    within = (at - step)[..., None]
+    low = np.take_along_axis(sums, step[..., None], axis=-2)
+    high = np.take_along_axis(sums, step[..., None] + 1, axis=-2)
+    return low + within * (high - low)

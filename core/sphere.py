@@ -167,13 +167,14 @@ def circle(to_centre: Floats, angular_radius: float, count: int = 361) -> Floats
     return np.cos(angular_radius) * to_centre + np.sin(angular_radius) * rim
 
 
-def tangents(direction: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors that stand upright on `direction` and on each other."""
-    helper = np.zeros(3)
-    helper[np.argmin(np.abs(direction))] = 1.0
-    first = np.cross(direction, helper)
-    first /= np.linalg.norm(first)
-    return first, np.cross(direction, first)
+def tangents(directions: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors that stand upright on each direction and on each other, (..., 3)."""
+    helper = np.zeros_like(directions)
+    least = np.argmin(np.abs(directions), axis=-1)[..., None]
+    np.put_along_axis(helper, least, 1.0, axis=-1)
+    first = np.cross(directions, helper)
+    first /= np.linalg.norm(first, axis=-1, keepdims=True)
+    return first, np.cross(directions, first)
 
 
 def connected_groups(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int32], int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,31 +39,30 @@ def disc_sun(
     mean direction. A cap of half-angle a gives a
     facing surface (1 + cos a) / 2 of its scalar irradiance.
     """
-    diameter = disc_diameter(shortfall)
+    diameter = float(disc_diameter(shortfall))
     return Sun(to_light, flux * (1 + np.cos(diameter / 2)) / 2, flux, diameter, stratum)
 
 
-def disc_diameter(shortfall: float) -> float:
-    """Diameter in radians, at most pi, of a uniform disc by its 1 - R.
+def disc_diameter(shortfall: ArrayLike) -> NDArray[np.float64]:
+    """Diameters in radians, at most pi, of uniform discs by their 1 - R.
 
     Such a disc has R = (1 + cos a) / 2, so a = 2 asin sqrt(1 - R); a hemisphere at most.
     """
-    return min(4 * float(np.arcsin(np.sqrt(min(shortfall, 0.5)))), np.pi)
+    return np.minimum(4 * np.arcsin(np.sqrt(np.minimum(shortfall, 0.5))), np.pi)
 
 
-def disc_on_ground(height: float, half_angle: float) -> float:
-    """Mean over a disc of what level ground gets: the cosine, 0 below the horizon.
+def disc_on_ground(height: ArrayLike, half_angle: ArrayLike) -> NDArray[np.float64]:
+    """Mean over each disc of what level ground gets: the cosine, 0 below the horizon.
 
     height: of its middle, the sine of the elevation. half_angle: radians, 0 for a point.
     """
-    if half_angle == 0:
-        return max(height, 0.0)
-    along = 1 - _RINGS * 2 * np.sin(half_angle / 2) ** 2
-    aside = np.sqrt((1 - along**2) * max(1 - height**2, 0))
-    return float(np.maximum((along * height)[:, None] + aside[:, None] * _AROUND, 0).mean())
+    height, half_angle = np.asarray(height)[..., None, None], np.asarray(half_angle)
+    along = 1 - _RINGS * 2 * np.sin(half_angle[..., None, None] / 2) ** 2
+    aside = np.sqrt((1 - along**2) * np.maximum(1 - height**2, 0))
+    return np.maximum(along * height + aside * _AROUND, 0).mean(axis=(-2, -1))
 
 
-_RINGS = (np.arange(8) + 0.5) / 8
+_RINGS = ((np.arange(8) + 0.5) / 8)[:, None]
 _AROUND = np.cos((np.arange(16) + 0.5) / 16 * np.pi)
 """A disc as rings of equal area and places around each; the other half is alike."""
 
