@@ -61,10 +61,9 @@ def edge_split(patches: Patches, count: int, shape: Shape, allowed: float = 0.0)
 def _truest_cuts(light: EdgeLight, count: int, allowed: float) -> Owner:
     best, least = np.zeros(0, np.intp), np.inf
     for owner, squared in _cuts(light, count, light.squared_errors):
-        error = error_of(squared)
-        if error < least:  # a round sun cut in two is two bad halves
-            best, least = owner.copy(), error
-        if error <= allowed:
+        if squared.sum() < least:  # a round sun cut in two is two bad halves
+            best, least = owner.copy(), squared.sum()
+        if error_of(squared) <= allowed:
             break
     return best
 

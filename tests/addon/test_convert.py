@@ -113,8 +113,8 @@ def test_settings_come_from_the_scene_and_from_arguments(scene, two_suns):
 
 def test_residual_none_leaves_only_lamps(scene, two_suns):
     hdri_world(scene, two_suns)
-    bpy.ops.sunsplit.convert(share_auto=False, share=1.0, lights=12)
-    assert len(suns(scene)) == 12
+    bpy.ops.sunsplit.convert(share_auto=False, share=1.0, lights=4)
+    assert len(suns(scene)) == 4
     assert "Sunsplit: Residual" not in scene.world.node_tree.nodes
 
 
