@@ -39,8 +39,8 @@ JUDGED = 3
 
 TOGETHER = 7.0
 """How much a piece of light is drawn to where it brings the colours of a cell back to one place,
-against how much it is drawn to the nearest cell. Between 5 and 10 the worst channel's error falls
-by 3 % against luminance's, while the latter grows by 5 %."""
+against how much it is drawn to the nearest cell. The worst channel is wrong by 1.24 to 1.25 times
+what luminance is with 4, 16 and 64 lights; with 5 or 10 by 1.22 to 1.31 times."""
 
 GROUND = 1.0
 """How much what level ground gets wrong counts against a shadow's edge anywhere: the horizon is one

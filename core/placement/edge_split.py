@@ -25,7 +25,7 @@ comes with the first two times."""
 GO_ON = 2
 """Of the cells that were tried, how many go into another round."""
 
-AT_ONCE = 8
+ONE_IN = 8
 """One in so many cells is cut at a time: the worst of many would be cut soon anyway."""
 
 Measure = Callable[[Owner, Owner, int], Floats]
@@ -94,7 +94,7 @@ def _cuts(light: EdgeLight, count: int, measure: Measure) -> Iterator[tuple[Owne
     yield owner, total
     while heap and cells < count:
         made: list[tuple[int, Owner]] = []
-        for _ in range(min(max(cells // AT_ONCE, 1), count - cells, len(heap))):
+        for _ in range(min(max(cells // ONE_IN, 1), count - cells, len(heap))):
             _, _, number, members, wrong = heapq.heappop(heap)
             first = light.halves(members)
             if first is None:
