@@ -9,6 +9,7 @@ means truer shadows, until too few suns stand for too much.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import sphere
 from .environment import EnvironmentMap, luminance
@@ -18,7 +19,8 @@ from .placement.edge import edge_suns
 from .prediction import Prediction
 from .region import RegionLight, light_of_map
 from .settings import ConversionSettings
-from .strata import Strata, stratify, stratify_at
+from .strata import Strata, stratify, stratify_at, stratify_calm
+from .visible import VisiblePart
 
 SHARES = (1.0, 0.95, 0.9, 0.8, 0.65, 0.5, 0.3)
 """What is tried, in this order, after whole peaks with their halo. Between two of them the error is
@@ -34,21 +36,27 @@ USUAL_LIGHTS = 16
 """For as many lights the share is chosen where their number is chosen after it."""
 
 
-def choose_strata(environment: EnvironmentMap, settings: ConversionSettings) -> Strata:
-    """The strata for a share that is given or chosen for the map, the lights and the target."""
+def choose_strata(
+    environment: EnvironmentMap, settings: ConversionSettings, visible: VisiblePart | None = None
+) -> Strata:
+    """The strata for a share that is given or chosen for the map, the lights and the target.
+
+    visible: what region A is chosen from, where it is chosen for least noise.
+    """
     if settings.share is not None:
         return stratify(environment, settings.share, settings.strata)
     if not settings.shadowed_residual:
         return _truest(environment, settings)
+    radiance = visible.of(environment.radiance) if visible else environment.radiance
     if settings.lights is not None:
-        return _calmest(environment, settings)
-    return stratify(environment, None, settings.strata)
+        return _calmest(radiance, settings)
+    return stratify_calm(luminance(radiance), settings.strata)
 
 
-def _calmest(environment: EnvironmentMap, settings: ConversionSettings) -> Strata:
+def _calmest(radiance: NDArray[np.float32], settings: ConversionSettings) -> Strata:
     """From the border of least noise upwards, as long as noise and wrong shadows become less."""
-    whole = light_of_map(environment.radiance)
-    lum = luminance(environment.radiance)
+    whole = light_of_map(radiance)
+    lum = luminance(radiance)
     found = borders(lum, sphere.row_solid_angles(whole.width, whole.height))
     best, least = stratify_at(lum, found.best_level, settings.strata), np.inf
     for k in range(found.best, 0, -PER_OCTAVE):
