@@ -8,12 +8,13 @@ from typing import Any
 
 import bpy
 
-from ..core.conversion import Conversion, convert
+from ..core.conversion import Conversion
 from ..core.environment import LUMINANCE_WEIGHTS, EnvironmentMap
 from ..core.errors import UnusableInput
 from ..core.sampling import needs_light_tree
 from ..core.settings import ConversionSettings
 from ..core.visible import VisiblePart, visible_part
+from .known import known_conversion
 from .lamps import link_lamps, make_lamps, remove_lamps, unlink_lamps
 from .scene_needs import ALL, SceneNeeds, needs_of
 from .trace import TAG
@@ -92,7 +93,7 @@ def convert_scene(
     needs = needs_of(scene) if skips else ALL
     environment = read_image(light.image)
     needed = _without_excess(settings, environment.width, needs)
-    conversion = convert(environment, needed, visible=_visible(environment, light, needs))
+    conversion = known_conversion(environment, needed, _visible(environment, light, needs))
     original = state.original_world if again else world
     tree_off = _is_without_light_tree(scene, conversion, needs)
     camera_width = needs.width_for_camera(environment.width)

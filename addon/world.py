@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ..core.conversion import Conversion
 from ..core.environment import EnvironmentMap, environment_from_pixels
 from ..core.errors import CannotWrite, UnusableInput
-from ..core.residual import reduced
 from ..core.sampling import WorldSampling, choose_sampling
+from .known import known_map
 from .mapping import map_from_world
 from .trace import TAG, Place, lighting_textures
 
@@ -92,6 +92,11 @@ def read_image(image: bpy.types.Image) -> EnvironmentMap:
         )
     pixels = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(pixels)
+    return known_map(pixels, image.name, lambda: _environment(image, pixels))
+
+
+def _environment(image: bpy.types.Image, pixels: NDArray[np.float32]) -> EnvironmentMap:
+    width, height = image.size
     pixels = pixels.reshape(height, width, image.channels)[::-1]
     colour = pixels[..., :3] if image.channels >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
     return environment_from_pixels(colour, Path(image.name).stem, image.name)
@@ -160,7 +165,9 @@ def converted_world(
         if camera_sees_it:
             _show_camera(mix)
         if camera_sees_it and camera_width is not None:
-            narrow = packed_image(reduced(conversion.environment.radiance, camera_width), "camera")
+            narrow = packed_image(
+                conversion.environment.narrowed(camera_width).astype(np.float32), "camera"
+            )
             _insert(tree, texture, narrow, texture.interpolation, 300)
         _set_sampling(new, _sampling(conversion, closest))
     except BaseException:  # whatever it is, it goes on; only the half-made copy goes away

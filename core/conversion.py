@@ -12,7 +12,7 @@ from .environment import LUMINANCE_WEIGHTS, EnvironmentMap
 from .placement.choice import choose_suns
 from .progress import Progress, silent
 from .region import light_of_map, light_of_region_a
-from .residual import reduced, without
+from .residual import narrowed_without, without
 from .samples import MapOfSamples, map_of_samples
 from .settings import ConversionSettings
 from .share import choose_strata
@@ -79,21 +79,21 @@ def convert(
     progress("suns", 0.5)
     if settings.takes_whole_lights:
         light, chosen, notes = suns_for_whole_lights(light, strata, settings)
-        rest = without(environment, light)
     else:
-        rest, notes = without(environment, light), ()
-        unshadowed = None if settings.shadowed_residual else light_of_map(rest)
+        notes = ()
+        shadowed = settings.shadowed_residual
+        unshadowed = None if shadowed else light_of_map(without(environment, light))
         chosen = choose_suns(light, strata, settings, unshadowed)
     progress("residual", 0.7)
     residual, samples = None, None
     notes = (*_share_note(strata, settings), *notes, *chosen.notes)
     if settings.leaves_residual:
-        residual = reduced(rest, settings.residual_width)
+        residual = narrowed_without(environment, light, settings.residual_width)
         if settings.residual == "voronoi":
             samples, more = map_of_samples(residual, settings)
             residual, notes = samples.radiance, notes + more
     progress("account", 0.9)
-    account = settle(environment.radiance, chosen.suns, residual)
+    account = settle(environment, chosen.suns, residual)
     progress("done", 1.0)
     return Conversion(
         environment,

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
-from .environment import EnvironmentMap, luminance
+from .environment import EnvironmentMap
 
 ROWS = 24
 """Of cells, from pole to pole."""
@@ -84,7 +84,7 @@ def _may_reach(
 ) -> NDArray[np.bool_]:
     """Cells far from where light was found to come from that are yet too bright to leave out: seen
     after all, or so bright that to find nothing proves nothing."""
-    lum = luminance(environment.radiance)
+    lum = environment.luminance
     cell = _cells_of_pixels(environment.width, environment.height).ravel()
     solid = sphere.row_solid_angles(environment.width, environment.height)
     light = np.bincount(cell, (lum * solid[:, None]).ravel(), len(near))

@@ -41,7 +41,7 @@ def sees_world(scene) -> bool:
 
 def test_in_a_box_nothing_is_needed(scene):
     needs = needs_of(scene)
-    assert not (needs.camera_sees_world or needs.mirrors or needs.other_lights)
+    assert not any((needs.camera_sees_world, needs.mirrors, needs.other_lights))
     assert len(needs.reach.places) > 1000
     assert not needs.reach.escaped
 
