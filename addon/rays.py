@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
@@ -15,8 +15,11 @@ from ..core.visible import Looks
 PICTURE = 48, 27
 """Rays through a camera's picture that look for the world."""
 
-PATHS = 27, 15
-"""And those that go on from what they meet."""
+PATHS = 400
+"""And so many that go on from what they meet."""
+
+MOST_PLACES = 10_000
+"""Where they end, at most, if it must be known that something bright reaches none of them."""
 
 BOUNCES = 3
 """So often does a path go on; later ones bring little light."""
@@ -58,22 +61,15 @@ class Sight:
         """Whether any ray through a grid over the picture leaves the scene."""
         camera = self.scene.camera
         near, far = camera.data.clip_start, camera.data.clip_end
-        for direction in _picture(self.scene, PICTURE):
+        columns, rows = PICTURE
+        for ray in range(columns * rows):
+            row, column = divmod(ray, columns)
+            direction = _through_picture(self.scene, column / (columns - 1), row / (rows - 1))
             start = camera.matrix_world.translation + direction * near
             hit, _, _, _, thing, _ = self.scene.ray_cast(self.graph, start, direction, distance=far)
             if not hit or thing.hide_render or not thing.visible_camera:
                 return True
         return False
-
-    def reach(self) -> Reach:
-        """Follow paths from the camera; the same each time."""
-        found = Reach(self, [], [])
-        random = np.random.default_rng(0)
-        camera = self.scene.camera
-        for direction in _picture(self.scene, PATHS):
-            start = camera.matrix_world.translation + direction * camera.data.clip_start
-            found.follow(start, direction, random)
-        return found
 
     def cast(
         self, start: Vector, direction: Vector, passed: list[Place] | None = None
@@ -110,33 +106,57 @@ class Place:
 @dataclass(frozen=True)
 class Reach:
     """Places that light to the camera comes from, and directions of rays from there to the world,
-    in the scene's axes."""
+    in the scene's axes. More places are found when they are asked for; always the same."""
 
     sight: Sight
-    places: list[Place]
-    escaped: list[Vector]
+    places: list[Place] = field(default_factory=list)
+    escaped: list[Vector] = field(default_factory=list)
+    random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
+
+    @classmethod
+    def of(cls, sight: Sight) -> Reach:
+        found = cls(sight)
+        for _ in range(PATHS):
+            found._follow_another()
+        return found
 
     def looks(self, to_map: NDArray[np.float64]) -> Looks:
         """In the axes of a map; to_map: rotation (3, 3) from the scene's."""
         return Looks(
             np.array(self.escaped, dtype=np.float64).reshape(-1, 3) @ to_map.T,
             LOOKS * len(self.places),
-            len(self.places),
+            MOST_PLACES if self.places else 0,
             lambda direction, count: self.is_reached(Vector(to_map.T @ direction), count),
         )
 
-    def follow(self, start: Vector, direction: Vector, random: np.random.Generator) -> None:
+    def is_reached(self, direction: Vector, count: int) -> bool:
+        """Whether light from a direction comes to any of so many places."""
+        for _ in range(count):  # a path that meets nothing finds no place
+            if len(self.places) >= count:
+                break
+            self._follow_another()
+        some = np.linspace(0, len(self.places), count, endpoint=False).astype(int)
+        return any(
+            place.normal.dot(direction) > 0 and self.sight.cast(place.point, direction) is None
+            for place in (self.places[k] for k in some)
+        )
+
+    def _follow_another(self) -> None:
+        """A path from the camera, through another point of its picture."""
+        camera = self.sight.scene.camera
+        direction = _through_picture(self.sight.scene, *self.random.random(2))
+        start = camera.matrix_world.translation + direction * camera.data.clip_start
         place = self.sight.cast(start, direction, self.places)
         for _ in range(BOUNCES):
             if place is None:
                 return
             self.places.append(place)
-            place = self._look_around(place, random)
+            place = self._look_around(place)
 
-    def _look_around(self, place: Place, random: np.random.Generator) -> Place | None:
+    def _look_around(self, place: Place) -> Place | None:
         """The last place that one of some rays over the surface meets."""
         last = None
-        for x, y, z in random.normal(size=(LOOKS, 3)):
+        for x, y, z in self.random.normal(size=(LOOKS, 3)):
             direction = Vector((x, y, z)).normalized()
             if direction.dot(place.normal) < 0:
                 direction = -direction
@@ -145,14 +165,6 @@ class Reach:
                 self.escaped.append(direction)
             last = found or last
         return last
-
-    def is_reached(self, direction: Vector, count: int) -> bool:
-        """Whether light from a direction comes to any of so many places, spread over all."""
-        some = np.linspace(0, len(self.places), count, endpoint=False).astype(int)
-        return any(
-            place.normal.dot(direction) > 0 and self.sight.cast(place.point, direction) is None
-            for place in (self.places[k] for k in some)
-        )
 
 
 def stands_still(scene: bpy.types.Scene, shown: Iterable[bpy.types.Object]) -> bool:
@@ -201,17 +213,12 @@ def is_all_met(scene: bpy.types.Scene, shown: Iterable[bpy.types.Object]) -> boo
     )
 
 
-def _picture(scene: bpy.types.Scene, grid: tuple[int, int]) -> Iterator[Vector]:
-    """Directions through a grid over the picture, its corners too, in the scene's axes."""
+def _through_picture(scene: bpy.types.Scene, across: float, down: float) -> Vector:
+    """The direction through a point of the picture, (0, 0) its upper left, in the scene's axes."""
     camera = scene.camera
     top_right, bottom_right, bottom_left, top_left = camera.data.view_frame(scene=scene)
-    turn = camera.matrix_world.to_quaternion()
-    columns, rows = grid
-    for row in range(rows):
-        left = top_left.lerp(bottom_left, row / (rows - 1))
-        right = top_right.lerp(bottom_right, row / (rows - 1))
-        for column in range(columns):
-            yield turn @ left.lerp(right, column / (columns - 1)).normalized()
+    left, right = top_left.lerp(bottom_left, down), top_right.lerp(bottom_right, down)
+    return camera.matrix_world.to_quaternion() @ left.lerp(right, across).normalized()
 
 
 def camera_width(scene: bpy.types.Scene) -> int | None:

@@ -82,7 +82,7 @@ def needs_of(scene: bpy.types.Scene) -> SceneNeeds:
         other_lights=any(thing.type == "LIGHT" and thing not in own for thing in shown)
         or any(_shines(node) for node in nodes),
         camera_width=camera_width(scene),
-        reach=sight.reach() if sight and _is_told_by_rays(scene, shown, nodes) else None,
+        reach=Reach.of(sight) if sight and _is_told_by_rays(scene, shown, nodes) else None,
     )
 
 

@@ -75,7 +75,9 @@ def convert(
     progress("strata", 0.0)
     strata = choose_strata(environment, settings, visible)
     progress("region A", 0.3)
-    light = light_of_region_a(environment, strata, settings.filled)
+    light = strata.once(
+        settings.filled, lambda: light_of_region_a(environment, strata, settings.filled)
+    )
     progress("suns", 0.5)
     if settings.takes_whole_lights:
         light, chosen, notes = suns_for_whole_lights(light, strata, settings)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from . import sphere
 from .errors import UnusableInput
+from .memo import Memo
 from .tolerances import HALF_MAXIMUM
 
 LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
@@ -36,7 +37,7 @@ class Repairs:
 
 
 @dataclass(frozen=True, eq=False)
-class EnvironmentMap:
+class EnvironmentMap(Memo):
     """An equirectangular radiance map.
 
     radiance: float32 (height, width, 3), linear Rec.709, rows downwards; finite, not negative.
@@ -61,15 +62,9 @@ class EnvironmentMap:
         """Of each pixel, (height, width)."""
         return luminance(self.radiance)
 
-    @cached_property
-    def _narrowed(self) -> dict[int, NDArray[np.float64]]:
-        return {}
-
     def narrowed(self, width: int) -> NDArray[np.float64]:
         """The map at another width, (width // 2, width, 3); see `narrowed`."""
-        if width not in self._narrowed:
-            self._narrowed[width] = narrowed(self.radiance, width)
-        return self._narrowed[width]
+        return self.once(("narrowed", width), lambda: narrowed(self.radiance, width))
 
     @cached_property
     def scalar_irradiance(self) -> NDArray[np.float64]:

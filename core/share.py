@@ -8,19 +8,22 @@ means truer shadows, until too few suns stand for too much.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
 from .environment import EnvironmentMap
-from .noise import PER_OCTAVE, borders, squared_noise
+from .memo import Memo
+from .noise import PER_OCTAVE, Borders, borders, squared_noise
 from .patches import patches_of
 from .placement.edge import edge_suns
 from .prediction import Prediction
 from .region import RegionLight, light_of_map
 from .residual import without
 from .settings import ConversionSettings
-from .strata import Strata, stratify, stratify_at, stratify_calm
+from .strata import Strata, stratify, stratify_at
 from .visible import VisiblePart
 
 SHARES = (1.0, 0.95, 0.9, 0.8, 0.65, 0.5, 0.3)
@@ -37,6 +40,22 @@ USUAL_LIGHTS = 16
 """For as many lights the share is chosen where their number is chosen after it."""
 
 
+@dataclass(frozen=True, eq=False)
+class Seen(Memo):
+    """What counts of a map: its luminance, (height, width), and the borders it could be cut at."""
+
+    luminance: NDArray[np.float64]
+    borders: Borders
+
+    @classmethod
+    def of(cls, environment: EnvironmentMap, visible: VisiblePart | None) -> Seen:
+        lum = visible.of(environment.luminance) if visible else environment.luminance
+        return cls(lum, borders(lum, sphere.row_solid_angles(environment.width, len(lum))))
+
+    def strata(self, level: float, count: int) -> Strata:
+        return self.once((level, count), lambda: stratify_at(self.luminance, level, count))
+
+
 def choose_strata(
     environment: EnvironmentMap, settings: ConversionSettings, visible: VisiblePart | None = None
 ) -> Strata:
@@ -45,26 +64,23 @@ def choose_strata(
     visible: what region A is chosen from, where it is chosen for least noise.
     """
     if settings.share is not None:
-        return stratify(environment, settings.share, settings.strata)
+        choice = settings.share, settings.strata
+        return environment.latest("strata", choice, lambda: stratify(environment, *choice))
     if not settings.shadowed_residual:
         return _truest(environment, settings)
-    lum = visible.of(environment.luminance) if visible else environment.luminance
+    part = visible.key if visible else None
+    seen = environment.latest("seen", part, lambda: Seen.of(environment, visible))
     if settings.lights is not None:
-        return _calmest(environment, lum, settings)
-    return stratify_calm(lum, settings.strata)
+        return _calmest(environment, seen, settings)
+    return seen.strata(seen.borders.best_level, settings.strata)
 
 
-def _calmest(
-    environment: EnvironmentMap, lum: NDArray[np.float64], settings: ConversionSettings
-) -> Strata:
-    """From the border of least noise upwards, as long as noise and wrong shadows become less.
-
-    lum: of the visible part of the map.
-    """
-    found = borders(lum, sphere.row_solid_angles(environment.width, environment.height))
-    best, least = stratify_at(lum, found.best_level, settings.strata), np.inf
+def _calmest(environment: EnvironmentMap, seen: Seen, settings: ConversionSettings) -> Strata:
+    """From the border of least noise upwards, as long as noise and wrong shadows become less."""
+    found = seen.borders
+    best, least = seen.strata(found.best_level, settings.strata), np.inf
     for k in range(found.best, 0, -PER_OCTAVE):
-        strata = stratify_at(lum, float(found.level[k]), settings.strata)
+        strata = seen.strata(float(found.level[k]), settings.strata)
         wrong = _error(environment, strata, settings) ** 2
         noise = squared_noise(found.variance[k])
         if wrong + noise < least:
@@ -94,16 +110,19 @@ def _truest(environment: EnvironmentMap, settings: ConversionSettings) -> Strata
 
 def _error(environment: EnvironmentMap, strata: Strata, settings: ConversionSettings) -> float:
     """Predicted, for as many suns as are allowed."""
-    bright = _about_region_a(environment, strata)
+    bright = strata.once("bright", lambda: _about_region_a(environment, strata))
     unshadowed = None
     if not settings.shadowed_residual:
         rest = light_of_map(without(environment, bright))
         unshadowed = patches_of(rest, rest.luminous_flux, ROUGH)
     if not len(bright.pixels):
         return Prediction.of(None, strata.light, unshadowed).error(()) if unshadowed else 0.0
-    patches = patches_of(bright, bright.luminous_flux, ROUGH)
+    patches = bright.once("rough", lambda: patches_of(bright, bright.luminous_flux, ROUGH))
+    prediction = bright.latest(
+        "prediction", unshadowed, lambda: Prediction.of(patches, strata.light, unshadowed)
+    )
     suns = edge_suns(patches, strata, settings, settings.lights or USUAL_LIGHTS).suns
-    return Prediction.of(patches, strata.light, unshadowed).error(suns)
+    return prediction.error(suns)
 
 
 def _about_region_a(environment: EnvironmentMap, strata: Strata) -> RegionLight:

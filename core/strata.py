@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from . import sphere
 from .environment import EnvironmentMap
+from .memo import Memo
 from .noise import borders
 
 
 @dataclass(frozen=True, eq=False)
-class Strata:
+class Strata(Memo):
     """n strata of one map.
 
     luminance: float64 (height, width).
@@ -80,16 +81,11 @@ def stratify(environment: EnvironmentMap, share: float | None, count: int) -> St
     Pixels of equal luminance stay together, so the share that comes out is the nearest possible.
     """
     lum = environment.luminance
-    if share is None:
-        return stratify_calm(lum, count)
     solid = sphere.row_solid_angles(environment.width, environment.height)
-    return stratify_at(lum, _Levels.of(lum, solid).bound_of_share(share), count)
-
-
-def stratify_calm(lum: NDArray[np.float64], count: int) -> Strata:
-    """Cut a map of luminance (height, width) at the border of least noise."""
-    solid = sphere.row_solid_angles(*lum.shape[::-1])
-    return stratify_at(lum, borders(lum, solid).best_level, count)
+    if share is None:
+        return stratify_at(lum, borders(lum, solid).best_level, count)
+    levels = environment.once("levels", lambda: _Levels.of(lum, solid))
+    return stratify_at(lum, levels.bound_of_share(share), count)
 
 
 def stratify_at(lum: NDArray[np.float64], threshold: float, count: int) -> Strata:

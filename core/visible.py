@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ NEAR = np.radians(8)
 """A cell is visible that has its centre so near to a direction from which light was found to come:
 about a cell's diagonal."""
 
-WORTH = 0.001
+WORTH = 0.01
 """As a part of the light that is known to reach something: more must not be overlooked at once."""
 
 MOST_LOOKS = 10_000
@@ -42,6 +43,11 @@ class VisiblePart:
 
     cells: NDArray[np.bool_]
 
+    @cached_property
+    def key(self) -> bytes:
+        """The same for the same part."""
+        return self.cells.tobytes()
+
     def pixels(self, width: int, height: int) -> NDArray[np.bool_]:
         """Which pixels of a map of this size are visible, (height, width)."""
         return self.cells.ravel()[_cells_of_pixels(width, height)]
@@ -57,8 +63,8 @@ class Looks:
     """Looks from places that matter, in the directions of a map.
 
     escaped: those that met nothing but the map, unit vectors (n, 3). count: of all looks, evenly
-    over the half sphere above each place. places: how many there are. reaches: whether light from
-    a direction, (3,), comes to any of so many of them.
+    over the half sphere above each place. places: how many can be found. reaches: whether light
+    from a direction, (3,), comes to any of so many of them.
     """
 
     escaped: NDArray[np.float64]
@@ -84,26 +90,30 @@ def _may_reach(
 ) -> NDArray[np.bool_]:
     """Cells far from where light was found to come from that are yet too bright to leave out: seen
     after all, or so bright that to find nothing proves nothing."""
-    lum = environment.luminance
+    lum = environment.luminance.ravel()
     cell = _cells_of_pixels(environment.width, environment.height).ravel()
-    solid = sphere.row_solid_angles(environment.width, environment.height)
-    light = np.bincount(cell, (lum * solid[:, None]).ravel(), len(near))
+    light = environment.once("light of cells", lambda: _light_of_cells(environment, cell))
     size = np.repeat(sphere.row_solid_angles(*_SIZE), 2 * ROWS)
     met = (light / size)[sphere.pixels_at(looks.escaped, *_SIZE)]
     reaching = 2 * np.pi * met.sum() / looks.count
     bright = np.flatnonzero(~near & (light > WORTH * reaching))
     bright = bright[np.argsort(-light[bright], kind="stable")]
-    trials = np.ceil(RULE_OF_THREE * light[bright] / (WORTH * reaching)).astype(int)
+    trials = np.ceil(RULE_OF_THREE * light[bright] / max(WORTH * reaching, 1e-300))
     proven = trials <= looks.places
     proven &= np.cumsum(np.where(proven, trials, 0)) <= MOST_LOOKS
     for k in np.flatnonzero(proven):
         pixels = np.flatnonzero(cell == bright[k])
-        brightest = pixels[[np.argmax(lum.ravel()[pixels])]]
+        brightest = pixels[[np.argmax(lum[pixels])]]
         towards = sphere.pixel_centres(brightest, environment.width, environment.height)[0]
         proven[k] = not looks.reaches(towards, int(trials[k]))
     found = np.zeros(len(near), bool)
     found[bright[~proven]] = True
     return found
+
+
+def _light_of_cells(environment: EnvironmentMap, cell: NDArray[np.intp]) -> NDArray[np.float64]:
+    solid = sphere.row_solid_angles(environment.width, environment.height)
+    return np.bincount(cell, (environment.luminance * solid[:, None]).ravel(), 2 * ROWS * ROWS)
 
 
 def _cells_of_pixels(width: int, height: int) -> NDArray[np.intp]:
