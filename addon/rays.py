@@ -15,11 +15,15 @@ from ..core.visible import Looks
 PICTURE = 48, 27
 """Rays through a camera's picture that look for the world."""
 
-PATHS = 400
-"""And so many that go on from what they meet."""
+PLACES = 1000
+"""Where paths through the picture end that tell what is visible: three looks from each miss no
+more than a few degrees."""
+
+PATHS = 2000
+"""So many at most: some pictures show little but the world."""
 
 MOST_PLACES = 10_000
-"""Where they end, at most, if it must be known that something bright reaches none of them."""
+"""If it must be known that something bright reaches none of them."""
 
 BOUNCES = 3
 """So often does a path go on; later ones bring little light."""
@@ -117,6 +121,8 @@ class Reach:
     def of(cls, sight: Sight) -> Reach:
         found = cls(sight)
         for _ in range(PATHS):
+            if len(found.places) >= PLACES:
+                break
             found._follow_another()
         return found
 
@@ -146,21 +152,24 @@ class Reach:
         camera = self.sight.scene.camera
         direction = _through_picture(self.sight.scene, *self.random.random(2))
         start = camera.matrix_world.translation + direction * camera.data.clip_start
-        place = self.sight.cast(start, direction, self.places)
+        passed: list[Place] = []
+        place = self.sight.cast(start, direction, passed)
+        for side in passed:
+            self._look_around(side)
         for _ in range(BOUNCES):
             if place is None:
                 return
-            self.places.append(place)
             place = self._look_around(place)
 
     def _look_around(self, place: Place) -> Place | None:
-        """The last place that one of some rays over the surface meets."""
+        """Note a place, and the last one that some rays over its surface meet."""
+        self.places.append(place)
         last = None
         for x, y, z in self.random.normal(size=(LOOKS, 3)):
             direction = Vector((x, y, z)).normalized()
             if direction.dot(place.normal) < 0:
                 direction = -direction
-            found = self.sight.cast(place.point, direction, self.places)
+            found = self.sight.cast(place.point, direction)
             if found is None:
                 self.escaped.append(direction)
             last = found or last

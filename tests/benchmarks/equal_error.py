@@ -6,12 +6,15 @@ For each map and scene: the plain HDRI as Blender sets it up, the plain HDRI wit
 sampling that one might set by hand, and the conversion by default, all interleaved in one run.
 Errors are RMS over pixels and channels against a long reference of the plain HDRI, relative to its
 mean, the reference's own noise taken off. Time is from the call of render to its end. Time to an
-error is read off a fit of noise^2 = a / samples and seconds = b + c * samples.
+error is read off a fit of noise^2 = a / samples and seconds = b + c * samples. Peak memory is that
+of a process that opens the file and renders one sample a pixel.
 """
 
 from __future__ import annotations
 
 import argparse
+import subprocess
+import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,8 +22,11 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from scipy.ndimage import zoom
 
 from sunsplit.addon.scene import convert_scene
+from sunsplit.core.files import exr
+from sunsplit.core.files.maps import load
 from sunsplit.core.settings import ConversionSettings
 from tests.benchmarks import equal_error_report
 from tests.benchmarks.scenes import SCENES
@@ -30,14 +36,18 @@ PLAIN, SPLIT = "plain HDRI", "Sunsplit"
 BY_HAND = ("NONE", "256", "512", "1024", "2048", "4096")
 TARGETS = (0.05, 0.02)
 
+TILES = 8
+"""Along a picture's side, whose means are taken as independent of each other."""
+
 
 @dataclass(frozen=True)
 class Curve:
     """What one configuration of a map and scene needs.
 
     lamps: of the conversion. noise: variance of one sample a pixel, in squares of the mean.
-    bias: RMS that more samples would not take away. mean: of the picture against the reference's.
-    start, each: seconds before the first sample and for each sample a pixel.
+    bias: RMS that more samples would not take away, and unsure, the standard error of its square.
+    mean: of the picture against the reference's. start, each: seconds before the first sample and
+    for each sample a pixel. memory: MB at the peak.
     """
 
     map: str
@@ -46,13 +56,16 @@ class Curve:
     lamps: int
     noise: float
     bias: float
+    unsure: float
     mean: float
     start: float
     each: float
+    memory: float
 
     def seconds_to(self, error: float) -> float:
-        """Seconds to an RMS error, one sample at least; infinite where bias alone exceeds it."""
-        rest = error**2 - self.bias**2
+        """Seconds to an RMS error, one sample at least; infinite where bias alone exceeds it, as
+        far as there certainly is one."""
+        rest = error**2 - max(self.bias**2 - 2 * self.unsure, 0)
         if rest <= 0:
             return np.inf
         return self.start + self.each * max(self.noise / rest, 1.0)
@@ -74,14 +87,47 @@ def curves_of(path: Path, scene: str, options: argparse.Namespace) -> list[Curve
                     _open(folder, way)
                     found = timed_render(bpy.context.scene, folder, samples, repeat)
                     shots[way].append((samples, *found))
-    return [_curve((path.stem, scene, way, ways[way]), shots[way], halves) for way in ways]
+        memory = {way: _peak(folder / f"{way}.blend") for way in ways}
+    return [
+        _curve((path.stem, scene, way, ways[way]), shots[way], halves, memory[way]) for way in ways
+    ]
+
+
+_PEAK = r"""
+import re, sys, bpy
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+bpy.context.scene.cycles.samples = 1
+bpy.ops.render.render()
+print("peak", int(re.search(r"VmHWM:\s+(\d+)", open("/proc/self/status").read())[1]) / 1024)
+"""
+
+
+def _peak(file: Path) -> float:
+    """MB that a process has at most in memory while it renders a file, by Linux."""
+    done = subprocess.run(
+        [sys.executable, "-c", _PEAK, str(file)], capture_output=True, text=True, check=True
+    )
+    return float(next(x for x in done.stdout.splitlines() if x.startswith("peak")).split()[1])
+
+
+def enlarged(path: Path, width: int, folder: Path) -> Path:
+    """The map, or one so wide, linear between its pixels, in the folder."""
+    world = load(path)
+    times = width // world.width
+    if times <= 1:
+        return path
+    # Around the seam the map goes on.
+    around = np.concatenate([world.radiance[:, -2:], world.radiance, world.radiance[:, :2]], axis=1)
+    wide = zoom(around, (times, times, 1), order=1, mode="nearest", grid_mode=True)
+    exr.write(folder / f"{path.stem}.exr", wide[:, 2 * times : -2 * times])
+    return folder / f"{path.stem}.exr"
 
 
 def _prepared(path: Path, scene: str, options: argparse.Namespace, folder: Path) -> dict[str, int]:
     """Each way as a file in the folder; its lamps."""
-    made = SCENES[scene](path.resolve(), options.size)
+    made = SCENES[scene](enlarged(path.resolve(), options.width, folder), options.size)
     ways = {}
-    for way in (PLAIN, *BY_HAND):
+    for way in (PLAIN, *options.by_hand):
         if way != PLAIN:
             world = made.world.cycles
             world.sampling_method = "MANUAL" if way.isdecimal() else way
@@ -107,6 +153,7 @@ def _curve(
     name: tuple[str, str, str, int],
     shots: list[tuple[int, np.ndarray, float]],
     halves: list[np.ndarray],
+    memory: float,
 ) -> Curve:
     mean = float(np.mean(halves))
     noises = []
@@ -117,11 +164,12 @@ def _curve(
     longest = [image for count, image, _ in shots if count == most]
     # Products of differences that share neither render nor reference: noise averages out.
     products = [
-        ((longest[i] - halves[i % 2]) * (longest[j] - halves[j % 2])).mean()
+        (longest[i] - halves[i % 2]) * (longest[j] - halves[j % 2])
         for i in range(len(longest))
         for j in range(i + 1, len(longest))
         if (j - i) % 2
     ]
+    square = np.mean(products, axis=0)
     each, start = np.polyfit(
         *zip(*[(count, _median(shots, count)) for count in {one[0] for one in shots}], strict=True),
         1,
@@ -129,11 +177,21 @@ def _curve(
     return Curve(
         *name,
         noise=float(np.median(noises)),
-        bias=float(np.sqrt(max(np.mean(products), 0))) / mean,
+        bias=float(np.sqrt(max(square.mean(), 0))) / mean,
+        unsure=_standard_error(square) / mean**2,
         mean=float(np.mean(longest)) / mean - 1,
         start=max(float(start), 0.0),
         each=float(each),
+        memory=memory,
     )
+
+
+def _standard_error(pixels: np.ndarray) -> float:
+    """Of the mean over pixels that are alike near each other, (height, width, 3)."""
+    side = max(len(pixels) // TILES, 1)
+    tiles = pixels[: side * TILES, : side * TILES].reshape(TILES, side, TILES, side, 3)
+    means = tiles.mean(axis=(1, 3, 4))
+    return float(means.std(ddof=1) / np.sqrt(means.size))
 
 
 def _median(shots: list[tuple[int, np.ndarray, float]], samples: int) -> float:
@@ -145,17 +203,20 @@ def main(arguments: Sequence[str] | None = None) -> list[Curve]:
     parser.add_argument("maps", nargs="+", type=Path, metavar="MAP")
     parser.add_argument("-o", "--output", type=Path, default=Path("out"))
     parser.add_argument("--scenes", nargs="+", choices=SCENES, default=list(SCENES))
+    parser.add_argument("--by-hand", nargs="*", choices=BY_HAND, default=list(BY_HAND))
+    parser.add_argument("--width", type=int, default=0, help="enlarge narrower maps to so many")
     parser.add_argument("--size", type=int, default=96)
     parser.add_argument("--samples", type=int, nargs="+", default=[4, 16, 64])
     parser.add_argument("--repeats", type=int, default=2)
     parser.add_argument("--reference", type=int, default=2048, help="samples of each of two")
+    parser.add_argument("--name", default="equal_error", help="of table and plot")
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)
     curves = []
     for path in options.maps:
         for scene in options.scenes:
             curves += curves_of(path, scene, options)
-            equal_error_report.write(curves, options.output)
+            equal_error_report.write(curves, options.output, options.name)
             print(path.stem, scene, flush=True)
     return curves
 

@@ -111,6 +111,8 @@ def _under(path: Path) -> tuple[bpy.types.Scene, Matrix]:
     scene = fresh_scene()
     hdri_world(scene, path)
     scene.cycles.max_bounces = 4
+    # As Blender sets it up; without, a mirror's sun is all that a picture's error is made of.
+    scene.cycles.sample_clamp_indirect, scene.cycles.blur_glossy = 10.0, 1.0
     return scene, Matrix.Rotation(key_azimuth(path) + np.radians(35), 4, "Z")
 
 

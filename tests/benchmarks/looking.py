@@ -1,0 +1,169 @@
+"""What looking at a scene costs, and how soon another setting answers.
+
+    .venv-5.2/bin/python -m tests.benchmarks.looking MAP [-o FOLDER] [--width 4096] ...
+
+Looking at a scene of many triangles, and of many objects; at a scene where nothing can be skipped,
+as a part of converting and rendering it, interleaved with and without; and converting again with
+another number of lights, another share, and with the world turned. Medians.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from sunsplit.addon import known
+from sunsplit.addon.scene import convert_scene, restore_scene
+from sunsplit.addon.scene_needs import needs_of
+from sunsplit.core.settings import ConversionSettings
+from tests.benchmarks.equal_error import enlarged
+from tests.benchmarks.scenes import SCENES
+from tests.blender import add_mapping, add_mesh, diffuse, material, plate_mesh, timed_render
+
+
+@dataclass(frozen=True)
+class Result:
+    what: str
+    seconds: float
+
+
+def seconds(work: Callable[[], object]) -> float:
+    started = time.perf_counter()
+    work()
+    return time.perf_counter() - started
+
+
+def looks(path: Path, options: argparse.Namespace) -> list[Result]:
+    """The first look, which has to sort the triangles, and the next."""
+    found = []
+    for what, build, size in (
+        (f"{2 * options.side**2:,} triangles", _with_hills, options.side),
+        (f"{options.objects} objects", _with_objects, options.objects),
+    ):
+        scene = build(path, size)
+        bpy.context.view_layer.update()
+        found.append(Result(f"look at {what}, first", seconds(lambda s=scene: needs_of(s))))
+        again = [seconds(lambda s=scene: needs_of(s)) for _ in range(options.repeats)]
+        found.append(Result(f"look at {what}, again", float(np.median(again))))
+    return found
+
+
+def _with_hills(path: Path, side: int) -> bpy.types.Scene:
+    """The outdoor scene on a ground of side x side squares."""
+    scene = SCENES["outdoor"](path, 96)
+    x, y = np.meshgrid(np.linspace(-40, 40, side + 1), np.linspace(-40, 40, side + 1))
+    corners = np.stack([x, y, 0.05 * np.sin(3 * x) * np.cos(2 * y) - 0.1], axis=-1).reshape(-1, 3)
+    first = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
+    faces = np.stack([first, first + 1, first + side + 2, first + side + 1], axis=-1)
+    mesh = bpy.data.meshes.new("Hills")
+    mesh.from_pydata(corners, [], faces)
+    add_mesh(scene, mesh, diffuse("Hills", 0.5), Matrix())
+    return scene
+
+
+def _with_objects(path: Path, count: int) -> bpy.types.Scene:
+    scene = SCENES["outdoor"](path, 96)
+    stone = diffuse("Stone", 0.5)
+    rows = int(np.sqrt(count))
+    for number in range(count - len(scene.objects)):
+        place = Matrix.Translation((number % rows - rows / 2, number // rows - rows / 2, 0.01))
+        add_mesh(scene, plate_mesh(0.2), stone, place)
+    return scene
+
+
+def overhead(path: Path, options: argparse.Namespace) -> tuple[float, float]:
+    """Converting and rendering a scene where nothing can be skipped, with and without a look."""
+    scene = SCENES["glossy"](path, options.size)
+    floor = next(thing for thing in scene.objects if thing.name.startswith("Plate"))
+    scene.collection.objects.unlink(floor)
+    # Light comes through the pane from everywhere.
+    pane = material("Pane", (1, 1, 1), Transmission_Weight=1, Roughness=0.3)
+    add_mesh(scene, plate_mesh(0.8), pane, Matrix.Translation((0, 0, 1.5)))
+    scene.render.resolution_x = scene.render.resolution_y = 4 * options.size
+    bpy.context.view_layer.update()
+    times: dict[bool, list[float]] = {True: [], False: []}
+    with tempfile.TemporaryDirectory() as name:
+        for repeat in range(2 * options.repeats):
+            skips = bool(repeat % 2)
+            known.forget()
+            made = seconds(lambda s=skips: convert_scene(scene, ConversionSettings(), s))
+            if skips and "Skipped" in scene.sunsplit.report:
+                raise AssertionError(scene.sunsplit.report)
+            made += timed_render(scene, Path(name), options.samples, 0)[1]
+            times[skips].append(made)
+            restore_scene(scene)
+    return float(np.median(times[True])), float(np.median(times[False]))
+
+
+def changes(path: Path, options: argparse.Namespace) -> list[Result]:
+    """Converting again after a change."""
+    found = []
+    with tempfile.TemporaryDirectory() as name:
+        scene = SCENES["outdoor"](enlarged(path, options.width, Path(name)), 96)
+        texture = next(n for n in scene.world.node_tree.nodes if n.type == "TEX_ENVIRONMENT")
+        mapping = add_mapping(texture)
+        known.forget()
+        found.append(Result("convert, first", _convert(scene)))
+        _convert(scene, lights=8)
+        lights = [_convert(scene, lights=n) for n in (16, 4, 12, 6, 10)]
+        found.append(Result("another number of lights", float(np.median(lights))))
+        shares = [_convert(scene, share=s) for s in (0.5, 0.6, 0.55, 0.7, 0.65)]
+        found.append(Result("another share", float(np.median(shares[1:]))))
+        _convert(scene)
+        turns = []
+        for turn in (0.1, 0.2, 0.3, 0.4, 0.5):
+            nodes = scene.world.node_tree.nodes
+            nodes[mapping.name].inputs["Rotation"].default_value[2] = turn
+            turns.append(_convert(scene))
+        found.append(Result("the world turned", float(np.median(turns))))
+    return found
+
+
+def _convert(scene: bpy.types.Scene, **chosen: object) -> float:
+    return seconds(lambda: convert_scene(scene, ConversionSettings(**chosen)))
+
+
+def main(arguments: Sequence[str] | None = None) -> list[Result]:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("map", type=Path, metavar="MAP")
+    parser.add_argument("-o", "--output", type=Path, default=Path("out"))
+    parser.add_argument("--width", type=int, default=4096, help="of the map that is changed")
+    parser.add_argument("--side", type=int, default=707, help="squares along the hills")
+    parser.add_argument("--objects", type=int, default=400)
+    parser.add_argument("--size", type=int, default=96)
+    parser.add_argument("--samples", type=int, default=16)
+    parser.add_argument("--repeats", type=int, default=5)
+    options = parser.parse_args(arguments)
+    options.output.mkdir(parents=True, exist_ok=True)
+    path = options.map.resolve()
+    results = looks(path, options)
+    looked, plain = overhead(path, options)
+    results += changes(path, options)
+    lines = [
+        "# What looking at a scene costs, and how soon another setting answers",
+        "",
+        f"Blender {bpy.app.version_string}, {path.stem}; changes on the map enlarged to "
+        f"{options.width} pixels. Seconds, medians.",
+        "",
+        "| what | seconds |",
+        "| --- | --- |",
+        *(f"| {one.what} | {one.seconds:.3f} |" for one in results),
+        "",
+        f"Converting and rendering with {options.samples} samples a scene where nothing can be "
+        f"skipped takes {looked / plain - 1:+.1%} longer if it is looked at ({looked:.2f} against "
+        f"{plain:.2f} s, interleaved).",
+    ]
+    (options.output / "looking.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return results
+
+
+if __name__ == "__main__":
+    main()
