@@ -1,0 +1,70 @@
+"""Suns and residual in a pass of samples each: how noisy a sample of each is, and how many samples
+each gets in the time of one pass with both.
+
+Noise of two passes adds up: V_s / n_s + V_r / n_r for variances V of a sample and numbers n of
+samples. With costs c of a sample, and c_s n_s + c_r n_r given, it is least where n is proportional
+to sqrt(V / c) (Lagrange).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, floor, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .noise import OF_TABLE, OTHERWISE
+from .sampling import EVEN, choose_sampling, contrast, variance_of_suns
+from .suns import Sun
+
+
+@dataclass(frozen=True)
+class PassPart:
+    """One of two passes. variance: of a sample a pixel, in squares of the mean irradiance of both.
+    cost: of that sample, in samples of one pass with suns and residual."""
+
+    variance: float
+    cost: float = 1.0
+
+
+def part_of_suns(suns: Sequence[Sun], light: float, by_strength: bool) -> PassPart:
+    """The pass that shows suns alone.
+
+    light: luminance of the whole map's scalar irradiance. by_strength: how suns are chosen, see
+    `sampling.needs_light_tree`.
+    """
+    strength, lot = variance_of_suns(suns, light)
+    return PassPart(strength if by_strength else lot)
+
+
+def part_of_residual(
+    residual: NDArray[np.float32] | None, share: float, cells: bool = False
+) -> PassPart:
+    """The pass that shows the residual alone, and the map to the camera; see `choose_sampling`."""
+    if residual is None:
+        return PassPart(OTHERWISE)
+    moment, _ = contrast(residual)
+    variance = max(moment - EVEN, 0.0) * (1 - share) ** 2
+    if choose_sampling(residual, share, cells).method != "NONE":
+        variance = min(variance, OF_TABLE)
+    return PassPart(variance + OTHERWISE)
+
+
+def samples_of_passes(samples: int, suns: PassPart, residual: PassPart) -> tuple[int, int]:
+    """Samples of the suns' pass and of the residual's that together take the time of one pass with
+    so many samples, or less, for the least noise; one of each at least."""
+    ideal = samples * sqrt(suns.variance / suns.cost)
+    ideal /= sqrt(suns.variance * suns.cost) + sqrt(residual.variance * residual.cost)
+    most = max(floor((samples - residual.cost) / suns.cost), 1)
+
+    def left(number: int) -> float:
+        return max((samples - suns.cost * number) / residual.cost, 1.0)
+
+    def noise(number: int) -> float:
+        return suns.variance / number + residual.variance / left(number)
+
+    near = {min(max(number, 1), most) for number in (floor(ideal), ceil(ideal))}
+    chosen = min(near, key=noise)
+    return chosen, floor(left(chosen))
