@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import bpy
 from mathutils import Vector
 
+from .passes import users_layers
+
 SHARP = 0.25
 """Roughness below which a surface may show single pixels of a wide map."""
 
@@ -143,7 +145,7 @@ def _sees_world(
         return True
     if any(marker.camera for marker in scene.timeline_markers) or scene.render.use_multiview:
         return True
-    if len(scene.view_layers) > 1 or any(_is_otherwise_in_renders(thing) for thing in shown):
+    if len(users_layers(scene)) > 1 or any(_is_otherwise_in_renders(thing) for thing in shown):
         return True
     if any(made.hide_render for made in scene.collection.children_recursive):
         return True
