@@ -11,7 +11,7 @@ import bpy
 from ..core.conversion import Conversion, convert
 from ..core.environment import LUMINANCE_WEIGHTS
 from ..core.errors import UnusableInput
-from ..core.passes import part_of_residual, part_of_suns, samples_of_passes
+from ..core.passes import parts_of, samples_of_passes
 from ..core.sampling import needs_light_tree
 from ..core.settings import ConversionSettings
 from . import passes
@@ -160,18 +160,9 @@ def _add_pass(scene: bpy.types.Scene, conversion: Conversion, other_lights: bool
     """Move the lamps into a pass of their own; what was done."""
     if not conversion.suns:
         return ["One pass: without lamps there is nothing to show in a second one."]
-    account, settings = conversion.account, conversion.settings
-    number = passes.PassSamples(
-        *samples_of_passes(
-            passes.samples_of_scene(scene),
-            part_of_suns(
-                conversion.suns,
-                float(account.source @ LUMINANCE_WEIGHTS),
-                by_strength=scene.cycles.use_light_tree,
-            ),
-            part_of_residual(conversion.residual, account.share, settings.residual == "voronoi"),
-        )
-    )
+    parts = parts_of(conversion, by_strength=scene.cycles.use_light_tree)
+    whole = passes.samples_of_scene(scene)
+    number = passes.PassSamples(*samples_of_passes(whole, *parts))
     passes.add_suns_layer(scene, scene.sunsplit.collection, number, other_lights)
     lines = [
         f"Two passes: {number.suns} samples for the suns, {number.sky} for the sky.",

@@ -15,6 +15,8 @@ from math import ceil, floor, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from .conversion import Conversion
+from .environment import LUMINANCE_WEIGHTS
 from .noise import OF_TABLE, OTHERWISE
 from .sampling import EVEN, choose_sampling, contrast, variance_of_suns
 from .suns import Sun
@@ -29,12 +31,21 @@ class PassPart:
     cost: float = 1.0
 
 
-def part_of_suns(suns: Sequence[Sun], light: float, by_strength: bool) -> PassPart:
-    """The pass that shows suns alone.
+def parts_of(conversion: Conversion, by_strength: bool) -> tuple[PassPart, PassPart]:
+    """The pass of the suns, and that of the residual.
 
-    light: luminance of the whole map's scalar irradiance. by_strength: how suns are chosen, see
-    `sampling.needs_light_tree`.
+    by_strength: how one of the suns is chosen, see `sampling.needs_light_tree`.
     """
+    account, cells = conversion.account, conversion.settings.residual == "voronoi"
+    light = float(account.source @ LUMINANCE_WEIGHTS)
+    return (
+        part_of_suns(conversion.suns, light, by_strength),
+        part_of_residual(conversion.residual, account.share, cells),
+    )
+
+
+def part_of_suns(suns: Sequence[Sun], light: float, by_strength: bool) -> PassPart:
+    """light: luminance of the whole map's scalar irradiance."""
     strength, lot = variance_of_suns(suns, light)
     return PassPart(strength if by_strength else lot)
 
@@ -42,7 +53,7 @@ def part_of_suns(suns: Sequence[Sun], light: float, by_strength: bool) -> PassPa
 def part_of_residual(
     residual: NDArray[np.float32] | None, share: float, cells: bool = False
 ) -> PassPart:
-    """The pass that shows the residual alone, and the map to the camera; see `choose_sampling`."""
+    """It shows the map to the camera, too. share, cells: see `choose_sampling`."""
     if residual is None:
         return PassPart(OTHERWISE)
     moment, _ = contrast(residual)
