@@ -27,7 +27,7 @@ LOOK = (
     *("material_override", "use_solid", "use_sky", "use_ao", "use_strand", "use_volumes"),
     "use_motion_blur",
 )
-"""What makes a layer's picture, but for lines that are drawn on it: they need no second drawing."""
+"""What makes a layer's picture; of lines over it, see `_is_more_than_light`."""
 
 RENDER = ("use_compositing", "use_single_layer")
 """Settings without which a render would not show both layers."""
@@ -60,9 +60,10 @@ def check(scene: bpy.types.Scene) -> None:
             f"Two Passes need one view layer in use, not {len(rendered)}: "
             "change that in the View Layer properties, or switch Two Passes off."
         )
-    if any(_catches_shadows(thing) for thing in scene.objects):
+    if _is_more_than_light(scene, rendered[0]):
         raise UnusableInput(
-            "A shadow catcher's two shadows cannot be added up: switch Two Passes off."
+            "Shadow catchers, Grease Pencil and Freestyle's lines cannot be added up: "
+            "switch Two Passes off."
         )
     tree = _compositor(scene)
     if tree is not None and not _is_plain(tree, scene, rendered[0]):
@@ -72,9 +73,16 @@ def check(scene: bpy.types.Scene) -> None:
         )
 
 
-def _catches_shadows(thing: bpy.types.Object) -> bool:
-    """Lamps have that mark too: it says that they make the shadows."""
-    return thing.is_shadow_catcher and thing.type != "LIGHT" and not thing.hide_render
+def _is_more_than_light(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> bool:
+    """Whether a layer's picture has what two pictures with a part of the light each do not add up
+    to: shadows as alpha, or lines over what is lit."""
+    if scene.render.use_freestyle and layer.use_freestyle:
+        return True
+    shown = [thing for thing in scene.objects if not thing.hide_render]
+    if layer.use_grease_pencil and any(thing.type == "GREASEPENCIL" for thing in shown):
+        return True
+    # Lamps have that mark, too: it says that a catcher shows their shadows.
+    return any(thing.is_shadow_catcher and thing.type != "LIGHT" for thing in shown)
 
 
 def samples_of_scene(scene: bpy.types.Scene) -> int:

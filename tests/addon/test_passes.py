@@ -289,6 +289,15 @@ def catch_shadows(scene):
     bpy.data.objects["Plain"].is_shadow_catcher = True
 
 
+def draw_lines(scene):
+    scene.render.use_freestyle = True
+
+
+def draw_by_pencil(scene):
+    kinds = bpy.data.grease_pencils if IS_5 else bpy.data.grease_pencils_v3
+    scene.collection.objects.link(bpy.data.objects.new("Pencil", kinds.new("Pencil")))
+
+
 def plain_compositor(scene):
     """What Blender makes when the compositor is switched on, or its New button pressed."""
     if IS_5:
@@ -325,7 +334,9 @@ def show_the_alpha(scene):
         (use_two_layers, "one view layer in use, not 2"),
         (use_no_layer, "one view layer in use, not 0"),
         (use_eevee, "for Cycles"),
-        (catch_shadows, "shadow catcher"),
+        (catch_shadows, "Shadow catchers"),
+        (draw_lines, "Freestyle"),
+        (draw_by_pencil, "Grease Pencil"),
         (blur, "compositor does more"),
         (show_nothing, "compositor does more"),
         (show_the_alpha, "compositor does more"),
@@ -414,6 +425,18 @@ def test_a_copy_of_the_scene_is_restored_by_itself(scene):
         assert not [n for n in left if n.name.startswith("Sunsplit")]
     assert not bpy.data.lights
     assert [world.name for world in bpy.data.worlds] == ["Sky"]
+
+
+def test_the_suns_layer_may_be_the_one_in_the_window(scene):
+    before = state(scene)
+    window = bpy.context.window
+    for _ in range(2):
+        bpy.ops.sunsplit.convert(two_passes=True)
+        window.view_layer = scene.view_layers[LAYER]
+    assert bpy.context.view_layer.name == LAYER
+    bpy.ops.sunsplit.restore()
+    assert window.view_layer == scene.view_layers[0]
+    assert state(scene) == before
 
 
 def test_our_own_layer_is_no_reason_to_think_that_the_world_is_seen(scene):
