@@ -21,6 +21,14 @@ from .noise import OF_TABLE, OTHERWISE
 from .sampling import EVEN, choose_sampling, contrast, variance_of_suns
 from .suns import Sun
 
+COST_OF_SUNS, COST_OF_SKY = 0.8, 0.5
+"""Time of a sample of each pass, in that of a sample of suns and residual together: without suns
+no ray looks for light. This and the next by docs/benchmarks/two_passes.md."""
+
+EVENLY = 0.3
+"""Variance that is left of a residual's, against that of suns': samples that are spread evenly
+suit a calm sky better than the edges of shadows."""
+
 
 @dataclass(frozen=True)
 class PassPart:
@@ -28,11 +36,11 @@ class PassPart:
     cost: of that sample, in samples of one pass with suns and residual."""
 
     variance: float
-    cost: float = 1.0
+    cost: float
 
 
 def parts_of(conversion: Conversion, by_strength: bool) -> tuple[PassPart, PassPart]:
-    """The pass of the suns, and that of the residual.
+    """The pass of the suns, of which there is one at least, and that of the residual.
 
     by_strength: how one of the suns is chosen, see `sampling.needs_light_tree`.
     """
@@ -47,20 +55,21 @@ def parts_of(conversion: Conversion, by_strength: bool) -> tuple[PassPart, PassP
 def part_of_suns(suns: Sequence[Sun], light: float, by_strength: bool) -> PassPart:
     """light: luminance of the whole map's scalar irradiance."""
     strength, lot = variance_of_suns(suns, light)
-    return PassPart(strength if by_strength else lot)
+    return PassPart(strength if by_strength else lot, COST_OF_SUNS)
 
 
 def part_of_residual(
     residual: NDArray[np.float32] | None, share: float, cells: bool = False
 ) -> PassPart:
-    """It shows the map to the camera, too. share, cells: see `choose_sampling`."""
+    """share, cells: see `choose_sampling`."""
     if residual is None:
-        return PassPart(OTHERWISE)
+        return PassPart(EVENLY * OTHERWISE, COST_OF_SKY)
     moment, _ = contrast(residual)
-    variance = max(moment - EVEN, 0.0) * (1 - share) ** 2
+    variance, cost = max(moment - EVEN, 0.0) * (1 - share) ** 2, COST_OF_SKY
     if choose_sampling(residual, share, cells).method != "NONE":
-        variance = min(variance, OF_TABLE)
-    return PassPart(variance + OTHERWISE)
+        # Rays look for light in the residual's table as they do for suns.
+        variance, cost = min(variance, OF_TABLE), COST_OF_SUNS
+    return PassPart(EVENLY * (variance + OTHERWISE), cost)
 
 
 def samples_of_passes(samples: int, suns: PassPart, residual: PassPart) -> tuple[int, int]:

@@ -53,7 +53,7 @@ def test_light_tree(tmp_path, sunrise):
 
 
 def test_two_passes(tmp_path, sunrise):
-    few = ["--size", "16", "--samples", "8", "--repeats", "2"]
+    few = ["--size", "16", "--samples", "8", "--repeats", "2", "--scenes", "outdoor"]
     (result,) = two_passes.main([str(sunrise), *few, "-o", str(tmp_path)])
     assert result.cost > 0
     assert sum(result.two.samples) >= 2

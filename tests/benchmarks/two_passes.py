@@ -2,9 +2,9 @@
 
     .venv-5.2/bin/python -m tests.benchmarks.two_passes MAP ... [-o FOLDER] [--scenes ...] ...
 
-Variances are of a sample a pixel, in squares of the picture's mean; costs of a sample in those of
-one pass; both beside what `core/passes.py` takes them for. Seconds are the processor's, which other
-work on the machine does not change much.
+Maps must have a sun at least. Variances are of a sample a pixel, in squares of the picture's mean;
+costs of a sample in those of one pass; both beside what `core/passes.py` takes them for. Seconds
+are the processor's, which other work on the machine does not change much.
 """
 
 from __future__ import annotations
@@ -132,8 +132,8 @@ def main(arguments: Sequence[str] | None = None) -> list[Result]:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("maps", nargs="+", type=Path, metavar="MAP")
     parser.add_argument("-o", "--output", type=Path, default=Path("out"))
-    parser.add_argument("--scenes", nargs="+", choices=SCENES, default=["outdoor"])
-    parser.add_argument("--size", type=int, default=128)
+    parser.add_argument("--scenes", nargs="+", choices=SCENES, default=["outdoor", "product"])
+    parser.add_argument("--size", type=int, default=96)
     parser.add_argument("--samples", type=int, default=64)
     parser.add_argument("--repeats", type=int, default=6)
     options = parser.parse_args(arguments)

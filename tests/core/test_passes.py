@@ -11,6 +11,9 @@ from sunsplit.core import ConversionSettings, convert, sphere
 from sunsplit.core.environment import LUMINANCE_WEIGHTS
 from sunsplit.core.noise import OF_TABLE, OTHERWISE
 from sunsplit.core.passes import (
+    COST_OF_SKY,
+    COST_OF_SUNS,
+    EVENLY,
     PassPart,
     part_of_residual,
     part_of_suns,
@@ -66,7 +69,7 @@ def test_samples_by_hand(suns, residual, number):
 
 
 def test_one_sample_becomes_one_of_each():
-    assert samples_of_passes(1, PassPart(1), PassPart(1)) == (1, 1)
+    assert samples_of_passes(1, PassPart(1, 1), PassPart(1, 1)) == (1, 1)
 
 
 def facing(lights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -99,9 +102,16 @@ def test_the_calmer_the_residual_the_less_its_variance():
     even = part_of_residual(pixels.astype(np.float32), 0.5).variance
     paint_disc(pixels, direction(40, 30), 20, (12, 12, 12))
     uneven = part_of_residual(pixels.astype(np.float32), 0.5).variance
-    assert part_of_residual(None, 1.0).variance == even == OTHERWISE
-    assert OTHERWISE < uneven <= OF_TABLE + OTHERWISE
+    assert part_of_residual(None, 1.0).variance == even == EVENLY * OTHERWISE
+    assert even < uneven <= EVENLY * (OF_TABLE + OTHERWISE)
     assert part_of_residual(pixels.astype(np.float32), 0.9).variance < uneven
+
+
+def test_a_residual_that_is_looked_for_takes_as_long_as_suns():
+    pixels = sky(64, 0.1)
+    assert part_of_residual(pixels.astype(np.float32), 0).cost == COST_OF_SKY
+    paint_disc(pixels, direction(40, 30), 5, (90, 90, 90))
+    assert part_of_residual(pixels.astype(np.float32), 0).cost == COST_OF_SUNS
 
 
 def test_parts_of_a_conversion():
