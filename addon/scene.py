@@ -163,10 +163,10 @@ def _add_pass(scene: bpy.types.Scene, conversion: Conversion, other_lights: bool
     parts = parts_of(conversion, by_strength=scene.cycles.use_light_tree)
     whole = passes.samples_of_scene(scene)
     number = passes.PassSamples(*samples_of_passes(whole, *parts))
-    passes.add_suns_layer(scene, scene.sunsplit.collection, number, other_lights)
+    layer = passes.add_suns_layer(scene, scene.sunsplit.collection, number, other_lights)
     lines = [
         f"Two passes: {number.suns} samples for the suns, {number.sky} for the sky.",
-        f'The view layer "{passes.LAYER}" has the lamps: choose it to see or change them.',
+        f'The view layer "{layer.name}" has the lamps: choose it to see or change them.',
     ]
     if other_lights:
         lines.append("Other lights shine too, so the suns' pass is a light group, not denoised.")
