@@ -8,13 +8,15 @@ from typing import Any
 
 import bpy
 
-from ..core.conversion import Conversion, convert
-from ..core.environment import LUMINANCE_WEIGHTS
+from ..core.conversion import Conversion
+from ..core.environment import LUMINANCE_WEIGHTS, EnvironmentMap
 from ..core.errors import UnusableInput
 from ..core.passes import parts_of, samples_of_passes
 from ..core.sampling import needs_light_tree
 from ..core.settings import ConversionSettings
+from ..core.visible import VisiblePart, visible_part
 from . import passes
+from .known import known_conversion
 from .lamps import link_lamps, make_lamps, remove_lamps, unlink_lamps
 from .light_groups import put_into_groups, remove_groups
 from .scene_needs import ALL, SceneNeeds, needs_of
@@ -24,11 +26,14 @@ from .world import (
     converted_world,
     find_light,
     is_animated,
-    name_residual,
+    name_images,
     read_image,
     remove_converted,
     unconverted,
 )
+
+LEAST_SAID = 0.0005
+"""Of all light: less of it that reaches nothing is not worth a sentence."""
 
 
 @dataclass(frozen=True)
@@ -111,19 +116,21 @@ def convert_scene(
     found = needs_of(scene)
     needs = found if options.skips else ALL
     environment = read_image(light.image)
-    conversion = convert(environment, _without_excess(settings, environment.width, needs))
+    needed = _without_excess(settings, environment.width, needs)
+    conversion = known_conversion(environment, needed, _visible(environment, light, needs))
     original = state.original_world if again else world
     tree_off = _is_without_light_tree(scene, conversion, needs)
+    camera_width = needs.width_for_camera(environment.width)
     sentences = [
         *_sentences(conversion),
         *_skipped(conversion, settings, needs, tree_off),
         *_warnings(scene, world, original, light),
     ]
-    new = converted_world(world, light, conversion, needs.camera_sees_world)
+    new = converted_world(world, light, conversion, needs.camera_sees_world, camera_width)
     lamps = make_lamps(conversion.suns, light, new)
     # From here on `light` must not be used: its nodes go with the world that is replaced.
     restore_scene(scene)
-    name_residual(new, conversion.environment.name)
+    name_images(new, conversion.environment.name)
     result = _install(scene, original, conversion, new, lamps)
     if tree_off:
         scene.cycles.use_light_tree, state.light_tree_off = False, True
@@ -142,6 +149,15 @@ def _without_excess(
     if settings.residual_width is not None:
         return settings
     return replace(settings, residual_width=needs.residual_width(width))
+
+
+def _visible(
+    environment: EnvironmentMap, light: WorldLight, needs: SceneNeeds
+) -> VisiblePart | None:
+    """What of the map reaches anything that the camera sees."""
+    if needs.reach is None:
+        return None
+    return visible_part(environment, needs.reach.looks(light.map_from_world))
 
 
 def _is_without_light_tree(
@@ -178,14 +194,25 @@ def _skipped(
 ) -> list[str]:
     """What was left out, and why."""
     lines = []
-    width = conversion.settings.residual_width
-    if conversion.residual is not None and width != settings.residual_width:
+    own, width = conversion.environment.width, conversion.settings.residual_width
+    if conversion.invisible_part > LEAST_SAID:
         lines.append(
-            f"Skipped: nothing mirrors sharply, so the world that lights is {width} pixels wide "
-            f"instead of {conversion.environment.width}."
+            f"Skipped: {conversion.invisible_part:.1%} of the light reaches nothing that the "
+            "camera shows: no lamps for it, it stays in the world."
         )
+    if conversion.residual is not None and width != settings.residual_width:
+        why = "the camera is too coarse for more" if needs.mirrors else "nothing mirrors sharply"
+        lines.append(
+            f"Skipped: {why}, so the world that lights is {width} pixels wide instead of {own}."
+        )
+    shown = needs.width_for_camera(own)
     if not needs.camera_sees_world:
         lines.append("Skipped: the camera does not see the world, so renders do not load the HDRI.")
+    elif shown is not None:
+        lines.append(
+            f"Skipped: at this resolution the camera shows no more than {shown} pixels around, so "
+            f"it gets a map that wide instead of {own}."
+        )
     if tree_off:
         lines.append("Skipped: the light tree, as the lamps are cheaper without and alone.")
     return lines

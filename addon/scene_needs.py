@@ -6,12 +6,11 @@ Whatever cannot be told is needed.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import bpy
-from mathutils import Vector
 
-from .passes import users_layers
+from .rays import Reach, Sight, camera_width, is_all_met, stands_still
 
 SHARP = 0.25
 """Roughness below which a surface may show single pixels of a wide map."""
@@ -20,32 +19,48 @@ LIGHTING_WIDTH = 1024
 """Pixels of a map that only lights: without its suns nothing in it is narrower than a third of a
 degree, as far as rougher surfaces and shadows can tell."""
 
-RAYS = 48, 27
-"""Rays through a camera's picture that look for the world."""
-
-DEFORMING = {
-    *("ARMATURE", "BUILD", "CLOTH", "DYNAMIC_PAINT", "EXPLODE", "FLUID", "MESH_CACHE"),
-    *("MESH_SEQUENCE_CACHE", "NODES", "OCEAN", "PARTICLE_SYSTEM", "SOFT_BODY", "WAVE"),
+TRANSLUCENT = {
+    *("BSDF_GLASS", "BSDF_REFRACTION", "BSDF_TRANSLUCENT", "SUBSURFACE_SCATTERING"),
+    *("BSDF_HAIR", "BSDF_HAIR_PRINCIPLED"),
 }
-"""Modifiers that may move a surface without a key on it."""
+"""Shaders, besides those that one sees through, that light comes through."""
 
 
 @dataclass(frozen=True)
 class SceneNeeds:
     """camera_sees_world: or a render may show it behind transparent things. mirrors: something
     reflects or refracts sharply. other_lights: something but the world and lamps of conversions
-    gives light."""
+    gives light. camera_width: pixels around the sphere that a picture can tell apart; None: any.
+    reach: what light from the world reaches; None: anything."""
 
     camera_sees_world: bool
     mirrors: bool
     other_lights: bool
+    camera_width: int | None = None
+    reach: Reach | None = field(default=None, compare=False)
+
+    def width_for_camera(self, width: int) -> int | None:
+        """Of the map that the camera sees, for a map of this width; None: as wide."""
+        return _narrower(width, self.camera_width) if self.camera_width else None
 
     def residual_width(self, width: int) -> int | None:
         """Of the map that lights, for a map of this width; None: as wide."""
-        if self.mirrors or width <= LIGHTING_WIDTH:
-            return None
-        narrower = range(LIGHTING_WIDTH, LIGHTING_WIDTH // 2 - 1, -2)
-        return next((part for part in narrower if width % part == 0), None)
+        if not self.mirrors:
+            return _narrower(width, LIGHTING_WIDTH // 2, LIGHTING_WIDTH)
+        if self.camera_width:
+            return _narrower(width, max(self.camera_width, LIGHTING_WIDTH))
+        return None
+
+
+def _narrower(width: int, least: int, wanted: int = 0) -> int | None:
+    """The narrowest whole part of a width that is at least so wide, or the widest up to what is
+    wanted; None: the width itself."""
+    if width <= wanted:
+        return None
+    parts = [width // n for n in range(2, width // least + 1) if width % (2 * n) == 0]
+    if wanted:
+        parts = [part for part in parts if part <= wanted][:1]
+    return parts[-1] if parts else None
 
 
 ALL = SceneNeeds(camera_sees_world=True, mirrors=True, other_lights=True)
@@ -53,19 +68,57 @@ ALL = SceneNeeds(camera_sees_world=True, mirrors=True, other_lights=True)
 
 
 def needs_of(scene: bpy.types.Scene) -> SceneNeeds:
-    """Look at a scene: its camera, lamps and materials."""
+    """Look at a scene: its camera, lamps, materials and shapes."""
     shown = list(_shown(scene.objects))
     trees = _trees(scene, shown)
     nodes = [node for tree in trees for node in _nodes(tree)]
     if any(tree.animation_data for tree in trees) or any(node.type == "SCRIPT" for node in nodes):
         return ALL
     own = {entry.lamp for entry in scene.sunsplit.lamps}
+    sight = _sight(scene, shown)
     return SceneNeeds(
-        camera_sees_world=_sees_world(scene, shown, nodes),
+        camera_sees_world=_sees_world(scene, nodes, sight),
         mirrors=any(_is_sharp(node) for node in nodes),
         other_lights=any(thing.type == "LIGHT" and thing not in own for thing in shown)
         or any(_shines(node) for node in nodes),
+        camera_width=camera_width(scene),
+        reach=Reach.of(sight) if sight and _is_told_by_rays(scene, shown, nodes) else None,
     )
+
+
+def _sight(scene: bpy.types.Scene, shown: list[bpy.types.Object]) -> Sight | None:
+    """The scene for rays, where they tell what renders will show."""
+    if not stands_still(scene, shown):
+        return None
+    graph = bpy.context.evaluated_depsgraph_get()
+    if graph.scene != scene:
+        return None
+    clear = {thing.name for thing in shown if _lets_light_through(thing)}
+    return Sight(scene, graph, frozenset(clear))
+
+
+def _is_told_by_rays(
+    scene: bpy.types.Scene, shown: list[bpy.types.Object], nodes: list[bpy.types.Node]
+) -> bool:
+    """Whether rays meet all that light would meet: no fog, and nothing that only renders show."""
+    if any(layer.material_override for layer in scene.view_layers):
+        return False
+    foggy = any(n.type == "OUTPUT_MATERIAL" and n.inputs["Volume"].is_linked for n in nodes)
+    return not foggy and is_all_met(scene, shown)
+
+
+def _lets_light_through(thing: bpy.types.Object) -> bool:
+    if thing.type == "MESH" and not (thing.visible_shadow and thing.visible_diffuse):
+        return True
+    trees = [s.material.node_tree for s in thing.material_slots if s.material]
+    return any(_is_translucent(node) for tree in trees if tree for node in _nodes(tree))
+
+
+def _is_translucent(node: bpy.types.Node) -> bool:
+    if node.type == "BSDF_PRINCIPLED":
+        inside = ("Transmission Weight", "Subsurface Weight")
+        return _is_seen_through(node) or any(_is_above(node, name, 0) for name in inside)
+    return _is_seen_through(node) or node.type in TRANSLUCENT
 
 
 def _shown(things: Iterable[bpy.types.Object]) -> Iterator[bpy.types.Object]:
@@ -133,68 +186,10 @@ def _is_seen_through(node: bpy.types.Node) -> bool:
     return node.type in ("BSDF_TRANSPARENT", "BSDF_RAY_PORTAL", "HOLDOUT")
 
 
-def _sees_world(
-    scene: bpy.types.Scene, shown: list[bpy.types.Object], nodes: list[bpy.types.Node]
-) -> bool:
-    """Whether a camera ray may reach the world. Rays through a grid must all be stopped, now: in
-    what moves, the world is taken to be seen."""
+def _sees_world(scene: bpy.types.Scene, nodes: list[bpy.types.Node], sight: Sight | None) -> bool:
+    """Whether a camera ray may reach the world."""
     if scene.render.film_transparent:
         return False
-    camera = scene.camera
-    if camera is None or camera.type != "CAMERA" or camera.data.type != "PERSP":
+    if sight is None or any(_is_seen_through(node) for node in nodes):
         return True
-    if any(marker.camera for marker in scene.timeline_markers) or scene.render.use_multiview:
-        return True
-    if len(users_layers(scene)) > 1 or any(_is_otherwise_in_renders(thing) for thing in shown):
-        return True
-    if any(made.hide_render for made in scene.collection.children_recursive):
-        return True
-    if any(_moves(thing) for thing in (camera, camera.data, *shown)):
-        return True
-    if any(_is_seen_through(node) for node in nodes):
-        return True
-    graph = bpy.context.evaluated_depsgraph_get()
-    if graph.scene != scene:
-        return True
-    return not all(_is_stopped(scene, graph, camera, ray) for ray in _rays(scene, camera))
-
-
-def _is_otherwise_in_renders(thing: bpy.types.Object) -> bool:
-    """Whether rays through the viewport's scene may meet another shape than a render's."""
-    return any(part.show_render != part.show_viewport for part in thing.modifiers)
-
-
-def _moves(thing: bpy.types.Object | bpy.types.Camera) -> bool:
-    made = thing.animation_data
-    if made and (made.action or len(made.drivers) or len(made.nla_tracks)):
-        return True
-    if not isinstance(thing, bpy.types.Object):
-        return False
-    if any(part.type in DEFORMING for part in thing.modifiers):
-        return True
-    keys = getattr(thing.data, "shape_keys", None)
-    if keys and keys.animation_data:
-        return True
-    return bool(thing.constraints or thing.rigid_body or (thing.parent and _moves(thing.parent)))
-
-
-def _rays(scene: bpy.types.Scene, camera: bpy.types.Object) -> Iterator[Vector]:
-    """Directions through the picture, its corners too, in the scene's axes."""
-    top_right, bottom_right, bottom_left, top_left = camera.data.view_frame(scene=scene)
-    turn = camera.matrix_world.to_quaternion()
-    for row in range(RAYS[1]):
-        left = top_left.lerp(bottom_left, row / (RAYS[1] - 1))
-        right = top_right.lerp(bottom_right, row / (RAYS[1] - 1))
-        for column in range(RAYS[0]):
-            yield turn @ left.lerp(right, column / (RAYS[0] - 1))
-
-
-def _is_stopped(
-    scene: bpy.types.Scene,
-    graph: bpy.types.Depsgraph,
-    camera: bpy.types.Object,
-    direction: Vector,
-) -> bool:
-    start = camera.matrix_world.translation + direction.normalized() * camera.data.clip_start
-    hit, _, _, _, thing, _ = scene.ray_cast(graph, start, direction, distance=camera.data.clip_end)
-    return hit and not thing.hide_render and thing.visible_camera
+    return sight.camera_sees_world()

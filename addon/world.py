@@ -14,6 +14,7 @@ from ..core.conversion import Conversion
 from ..core.environment import EnvironmentMap, environment_from_pixels
 from ..core.errors import CannotWrite, UnusableInput
 from ..core.sampling import WorldSampling, choose_sampling
+from .known import known_map
 from .light_groups import take_out_of_groups
 from .mapping import map_from_world
 from .trace import TAG, Place, lighting_textures
@@ -92,29 +93,37 @@ def read_image(image: bpy.types.Image) -> EnvironmentMap:
         )
     pixels = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(pixels)
+    return known_map(pixels, image.name, lambda: _environment(image, pixels))
+
+
+def _environment(image: bpy.types.Image, pixels: NDArray[np.float32]) -> EnvironmentMap:
+    width, height = image.size
     pixels = pixels.reshape(height, width, image.channels)[::-1]
     colour = pixels[..., :3] if image.channels >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
     return environment_from_pixels(colour, Path(image.name).stem, image.name)
 
 
-def residual_image(residual: NDArray[np.float32]) -> bpy.types.Image:
-    """A residual map as an image that travels inside the .blend file. Raises CannotWrite."""
+def packed_image(radiance: NDArray[np.float32], kind: str) -> bpy.types.Image:
+    """A map as an image that travels inside the .blend file. Raises CannotWrite.
+
+    kind: what it is; with the map's name it becomes the image's, see `name_images`.
+    """
     from ..core.files import exr
 
     try:
         with tempfile.TemporaryDirectory(prefix="sunsplit-") as folder:
-            path = Path(folder) / "residual.exr"
-            exr.write(path, residual)
+            path = Path(folder) / "map.exr"
+            exr.write(path, radiance)
             image = bpy.data.images.load(str(path))
             # Our own writer and Blender's packing keep the values; Image.save() would encode them.
             image.pack()
     except OSError as error:
         raise CannotWrite(
-            f"Cannot write the residual map into a temporary folder: {error.strerror}."
+            f"Cannot write the {kind} map into a temporary folder: {error.strerror}."
         ) from error
     image.filepath_raw = ""
     image.colorspace_settings.name = _working_space()
-    image[TAG] = True
+    image[TAG] = kind
     return image
 
 
@@ -125,13 +134,18 @@ def _working_space() -> str:
 
 
 def converted_world(
-    world: bpy.types.World, light: WorldLight, conversion: Conversion, camera_sees_it: bool = True
+    world: bpy.types.World,
+    light: WorldLight,
+    conversion: Conversion,
+    camera_sees_it: bool = True,
+    camera_width: int | None = None,
 ) -> bpy.types.World:
     """A copy of a world in which all rays but the camera's see the residual (or black), or all
     rays where the camera does not see it: then Cycles does not load the map.
 
     world: what `light` was found in; when it is a converted one, the copy loses what that
-    conversion has put in. Nothing is left behind when this fails.
+    conversion has put in. camera_width: of the map that the camera sees, None for the map itself.
+    Nothing is left behind when this fails.
     """
     new = world.copy()
     new[TAG] = True
@@ -145,15 +159,19 @@ def converted_world(
             tree = group.node_tree
         _strip(tree)
         texture, residual = tree.nodes[light.texture.node.name], conversion.residual
-        image = residual_image(residual) if residual is not None else None
+        image = packed_image(residual, "residual") if residual is not None else None
         # Between cells nothing is to be blended: a Voronoi map has edges.
         closest = conversion.settings.residual == "voronoi"
-        mix = _insert_residual(
-            tree, texture, image, "Closest" if closest else texture.interpolation
-        )
+        interpolation = "Closest" if closest else texture.interpolation
+        mix = _insert(tree, texture, image, interpolation, -300)
         if camera_sees_it:
             _show_camera(mix)
-        _set_sampling(new, choose_sampling(residual, conversion.account.share, closest))
+        if camera_sees_it and camera_width is not None:
+            narrow = packed_image(
+                conversion.environment.narrowed(camera_width).astype(np.float32), "camera"
+            )
+            _insert(tree, texture, narrow, texture.interpolation, 300)
+        _set_sampling(new, _sampling(conversion, closest))
     except BaseException:  # whatever it is, it goes on; only the half-made copy goes away
         remove_converted(new)
         raise
@@ -182,28 +200,32 @@ def _strip(tree: bpy.types.NodeTree) -> None:
         tree.nodes.remove(node)
 
 
-def _insert_residual(
+def _insert(
     tree: bpy.types.NodeTree,
     texture: bpy.types.Node,
     image: bpy.types.Image | None,
     interpolation: str,
+    higher: int,
 ) -> bpy.types.Node:
-    """Put a mix of an environment texture and the residual behind that texture: the mix, which
-    shows the residual."""
+    """Put a mix of an environment texture and another image, or black, behind that texture: the
+    mix, which shows the other; Cycles then does not load the first.
+
+    higher: than the texture, by so much the other is drawn."""
     outgoing = [link.to_socket for link in texture.outputs["Color"].links]
     mix = tree.nodes.new("ShaderNodeMix")
-    mix.name = mix.label = "Sunsplit: Camera or Residual"
+    mix.name = mix.label = f"Sunsplit: Use {image[TAG].title() if image else 'Black'}"
     mix.data_type, mix.blend_type = "RGBA", "MIX"
     mix.clamp_result = False
-    mix.location = texture.location.x + 280, texture.location.y - 60
+    mix.location = texture.location.x + 280, texture.location.y + higher / 5
     mix[TAG] = True
     mix.inputs[0].default_value = 0.0
     tree.links.new(texture.outputs["Color"], mix.inputs[7])
     mix.inputs[6].default_value = (0, 0, 0, 1)
     if image is not None:
-        rest = _texture_like(tree, texture, image)
-        rest.interpolation = interpolation
-        tree.links.new(rest.outputs["Color"], mix.inputs[6])
+        other = _texture_like(tree, texture, image)
+        other.interpolation = interpolation
+        other.location = texture.location.x, texture.location.y + higher
+        tree.links.new(other.outputs["Color"], mix.inputs[6])
     for socket in outgoing:
         tree.links.new(mix.outputs[2], socket)
     return mix
@@ -224,9 +246,8 @@ def _texture_like(
 ) -> bpy.types.Node:
     """An environment texture with another image and the same mapping."""
     rest = tree.nodes.new("ShaderNodeTexEnvironment")
-    rest.name = rest.label = "Sunsplit: Residual"
+    rest.name = rest.label = f"Sunsplit: {image[TAG].title()}"
     rest[TAG] = True
-    rest.location = texture.location.x, texture.location.y - 300
     rest.image = image
     rest.projection = texture.projection
     old, new = texture.texture_mapping, rest.texture_mapping
@@ -238,6 +259,10 @@ def _texture_like(
     if incoming:
         tree.links.new(incoming[0].from_socket, rest.inputs["Vector"])
     return rest
+
+
+def _sampling(conversion: Conversion, cells: bool) -> WorldSampling:
+    return choose_sampling(conversion.residual, conversion.visible_share, cells, conversion.visible)
 
 
 def _set_sampling(world: bpy.types.World, sampling: WorldSampling) -> None:
@@ -273,10 +298,10 @@ def remove_converted(world: bpy.types.World) -> None:
             bpy.data.images.remove(image)
 
 
-def name_residual(world: bpy.types.World, map_name: str) -> None:
-    """Name the residual image after the map; once an older one of that name is gone."""
+def name_images(world: bpy.types.World, map_name: str) -> None:
+    """Name the images of a conversion after the map; once older ones of that name are gone."""
     for image in _made_for(world)[1]:
-        image.name = f"{map_name} residual"
+        image.name = f"{map_name} {image[TAG]}"
 
 
 def _made_for(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .environment import LUMINANCE_WEIGHTS, scalar_irradiance
+from .environment import LUMINANCE_WEIGHTS, EnvironmentMap, scalar_irradiance
 from .suns import Sun
 
 Floats = NDArray[np.float64]
@@ -35,12 +35,12 @@ class Account:
 
 
 def settle(
-    source: NDArray[np.float32], suns: Sequence[Sun], residual: NDArray[np.float32] | None
+    environment: EnvironmentMap, suns: Sequence[Sun], residual: NDArray[np.float32] | None
 ) -> Account:
     """Add up a conversion. A residual of None counts as no light."""
     given = [sun.scalar_irradiance for sun in suns]
     return Account(
-        source=scalar_irradiance(source),
+        source=environment.scalar_irradiance,
         suns=np.sum(given, axis=0) if given else np.zeros(3),
         residual=np.zeros(3) if residual is None else scalar_irradiance(residual),
     )

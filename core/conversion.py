@@ -8,16 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .account import Account, settle
-from .environment import EnvironmentMap
+from .environment import LUMINANCE_WEIGHTS, EnvironmentMap
 from .placement.choice import choose_suns
 from .progress import Progress, silent
 from .region import light_of_map, light_of_region_a
-from .residual import reduced, without
+from .residual import narrowed_without, without
 from .samples import MapOfSamples, map_of_samples
 from .settings import ConversionSettings
 from .share import choose_strata
 from .strata import Strata
 from .suns import Sun
+from .visible import VisiblePart
 from .whole_lights import suns_for_whole_lights
 
 
@@ -29,7 +30,8 @@ class Conversion:
     or None. samples: what a Voronoi residual was made of, else None. predicted_error: what
     shadows of the suns are wrong by, as a part of the mean irradiance; see `prediction.Prediction`.
     ground_error: what level ground in the open gets wrong of the worst channel, as a part of its
-    irradiance. notes: plain sentences for the user.
+    irradiance. visible: what suns were chosen from, where that is not the whole map. notes: plain
+    sentences for the user.
     """
 
     environment: EnvironmentMap
@@ -41,38 +43,59 @@ class Conversion:
     account: Account
     predicted_error: float
     ground_error: float
+    visible: VisiblePart | None
     notes: tuple[str, ...]
+
+    @property
+    def visible_share(self) -> float:
+        """Part of the visible luminance that the suns give."""
+        return float(self.account.suns @ LUMINANCE_WEIGHTS) / self.strata.light
+
+    @property
+    def invisible_part(self) -> float:
+        """Of all luminance, what reaches nothing that is looked at."""
+        if self.visible is None:
+            return 0.0
+        return 1 - self.strata.light / float(self.account.source @ LUMINANCE_WEIGHTS)
 
 
 def convert(
     environment: EnvironmentMap,
     settings: ConversionSettings | None = None,
     progress: Progress = silent,
+    visible: VisiblePart | None = None,
 ) -> Conversion:
-    """Split a map into suns (region A) and a residual map (region B)."""
+    """Split a map into suns (region A) and a residual map (region B).
+
+    visible: what of the map reaches what is looked at, where that is known: what does not stays in
+    the residual, unless the share or the target asks for all of the map.
+    """
     settings = settings or ConversionSettings()
+    visible = visible if settings.chooses_border else None
     progress("strata", 0.0)
-    strata = choose_strata(environment, settings)
+    strata = choose_strata(environment, settings, visible)
     progress("region A", 0.3)
-    light = light_of_region_a(environment, strata, settings.filled)
+    light = strata.once(
+        settings.filled, lambda: light_of_region_a(environment, strata, settings.filled)
+    )
     progress("suns", 0.5)
     if settings.takes_whole_lights:
         light, chosen, notes = suns_for_whole_lights(light, strata, settings)
-        rest = without(environment, light)
     else:
-        rest, notes = without(environment, light), ()
-        unshadowed = None if settings.shadowed_residual else light_of_map(rest)
+        notes = ()
+        shadowed = settings.shadowed_residual
+        unshadowed = None if shadowed else light_of_map(without(environment, light))
         chosen = choose_suns(light, strata, settings, unshadowed)
     progress("residual", 0.7)
     residual, samples = None, None
     notes = (*_share_note(strata, settings), *notes, *chosen.notes)
     if settings.leaves_residual:
-        residual = reduced(rest, settings.residual_width)
+        residual = narrowed_without(environment, light, settings.residual_width)
         if settings.residual == "voronoi":
             samples, more = map_of_samples(residual, settings)
             residual, notes = samples.radiance, notes + more
     progress("account", 0.9)
-    account = settle(environment.radiance, chosen.suns, residual)
+    account = settle(environment, chosen.suns, residual)
     progress("done", 1.0)
     return Conversion(
         environment,
@@ -84,6 +107,7 @@ def convert(
         account,
         chosen.predicted_error,
         chosen.ground_error,
+        visible,
         notes,
     )
 

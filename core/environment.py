@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
 from .errors import UnusableInput
+from .memo import Memo
 from .tolerances import HALF_MAXIMUM
 
 LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
@@ -35,7 +37,7 @@ class Repairs:
 
 
 @dataclass(frozen=True, eq=False)
-class EnvironmentMap:
+class EnvironmentMap(Memo):
     """An equirectangular radiance map.
 
     radiance: float32 (height, width, 3), linear Rec.709, rows downwards; finite, not negative.
@@ -53,7 +55,21 @@ class EnvironmentMap:
     def repaired_share(self) -> float:
         """What setting negative values to zero has added, as a part of all luminance."""
         added = LUMINANCE_WEIGHTS @ np.array(self.repairs.negative_energy)
-        return float(added / (LUMINANCE_WEIGHTS @ scalar_irradiance(self.radiance)))
+        return float(added / (LUMINANCE_WEIGHTS @ self.scalar_irradiance))
+
+    @cached_property
+    def luminance(self) -> NDArray[np.float64]:
+        """Of each pixel, (height, width)."""
+        return luminance(self.radiance)
+
+    def narrowed(self, width: int) -> NDArray[np.float64]:
+        """The map at another width, (width // 2, width, 3); see `narrowed`."""
+        return self.once(("narrowed", width), lambda: narrowed(self.radiance, width))
+
+    @cached_property
+    def scalar_irradiance(self) -> NDArray[np.float64]:
+        """Integral of radiance over the whole sphere, (3,)."""
+        return scalar_irradiance(self.radiance)
 
     @property
     def height(self) -> int:
@@ -165,3 +181,22 @@ def scalar_irradiance(radiance: NDArray[np.floating]) -> NDArray[np.float64]:
     height, width = radiance.shape[:2]
     rows = radiance.sum(axis=1, dtype=np.float64)
     return sphere.row_solid_angles(width, height) @ rows
+
+
+def narrowed(radiance: NDArray[np.float32], width: int) -> NDArray[np.float64]:
+    """A map of another width, each pixel the mean of those it replaces.
+
+    Means are weighted by solid angle, so that every pixel keeps the light of its part of the
+    sphere and the account closes. Raises UnusableInput where the width is no whole part of the
+    map's.
+    """
+    height, own = radiance.shape[:2]
+    if width > own or own % width or width % 2:
+        raise UnusableInput(
+            f"A residual {width} pixels wide cannot be made of a map {own} wide: "
+            "the width must be even and a whole part of the map's."
+        )
+    step = own // width
+    weight = sphere.row_solid_angles(own, height).reshape(width // 2, step, 1, 1)
+    rows = radiance.reshape(width // 2, step, width, step, 3).sum(axis=3, dtype=np.float64)
+    return (rows * weight).sum(axis=1) / (step * weight.sum(axis=1))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from . import sphere
 from .environment import LUMINANCE_WEIGHTS, EnvironmentMap
+from .memo import Memo
 from .settings import Fill
 from .strata import Strata
 from .surroundings import surroundings
@@ -18,7 +19,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class RegionLight:
+class RegionLight(Memo):
     """The light that some pixels of a map give to suns.
 
     pixels: flat indices, rising, (p,). flux: scalar irradiance of each, float64 (p, 3).
@@ -39,6 +40,11 @@ class RegionLight:
         plane = np.zeros(self.height * self.width)
         plane[self.pixels] = self.luminous_flux
         return plane.reshape(self.height, self.width)
+
+    @cached_property
+    def lit(self) -> RegionLight:
+        """The part that shines."""
+        return self.part(self.luminous_flux > 0)
 
     def part(self, mask: NDArray[np.bool_]) -> RegionLight:
         return RegionLight(self.pixels[mask], self.flux[mask], self.width, self.height)

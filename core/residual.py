@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from . import sphere
 from .environment import EnvironmentMap
-from .errors import UnusableInput
 from .region import RegionLight
 from .tolerances import ROUNDED
 
@@ -24,23 +23,21 @@ def without(environment: EnvironmentMap, light: RegionLight) -> NDArray[np.float
     return residual
 
 
-def reduced(residual: NDArray[np.float32], width: int | None) -> NDArray[np.float32]:
-    """A residual map of another width, each pixel the mean of those it replaces.
+def narrowed_without(
+    environment: EnvironmentMap, light: RegionLight, width: int | None
+) -> NDArray[np.float32]:
+    """The same, of another width, without a look at the pixels that keep their light.
 
-    Means are weighted by solid angle, so that every pixel keeps the light of its part of the
-    sphere and the account closes. width: None for the map's own. Raises UnusableInput where the
-    width is no whole part of the map's.
+    width: None for the map's own. Raises UnusableInput where it is no whole part of that.
     """
-    height, own = residual.shape[:2]
-    if width is None or width == own:
-        return residual
-    if width > own or own % width or width % 2:
-        raise UnusableInput(
-            f"A residual {width} pixels wide cannot be made of a map {own} wide: "
-            "the width must be even and a whole part of the map's."
-        )
-    step = own // width
-    weight = sphere.row_solid_angles(own, height).reshape(width // 2, step, 1, 1, 1)
-    blocks = residual.reshape(width // 2, step, width, step, 3)
-    light = (blocks * weight).sum(axis=(1, 3), dtype=np.float64)
-    return (light / (step * weight.sum(axis=1)[:, 0])).astype(np.float32)
+    if width is None or width == environment.width:
+        return without(environment, light)
+    before = environment.narrowed(width).reshape(-1, 3)
+    step = environment.width // width
+    rows, columns = np.divmod(light.pixels, environment.width)
+    block = rows // step * width + columns // step
+    taken = np.stack([np.bincount(block, flux, len(before)) for flux in light.flux.T], axis=-1)
+    rest = before - taken / np.repeat(sphere.row_solid_angles(width, width // 2), width)[:, None]
+    # As above; a block is a sum of many pixels.
+    rest = np.where(rest > step * ROUNDED * before, rest, 0)
+    return rest.astype(np.float32).reshape(width // 2, width, 3)

@@ -10,10 +10,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from . import sphere
 from .environment import LUMINANCE_WEIGHTS, luminance
 from .noise import OTHERWISE, harmonics, mean_square_irradiance, square_from_one_place
-from .sphere import row_solid_angles
 from .suns import Sun
+from .visible import VisiblePart
 
 CALM_ENOUGH = 0.5
 """Variance of a sample, in squares of the mean irradiance of suns and residual, up to which
@@ -48,17 +49,21 @@ class WorldSampling:
 
 
 def choose_sampling(
-    residual: NDArray[np.float32] | None, share: float, cells: bool = False
+    residual: NDArray[np.float32] | None,
+    share: float,
+    cells: bool = False,
+    visible: VisiblePart | None = None,
 ) -> WorldSampling:
     """None or a small table where the residual is calm, Cycles' own large one where it is not.
 
-    share: of all light that suns give: what little the residual holds adds little noise.
+    share: of all visible light that suns give: what little the residual holds adds little noise.
     cells: of a Voronoi map, the table is as wide as the map: a smaller one blends what edges part,
     Cycles' own takes three times as long for the same picture (docs/benchmarks/table1.md).
+    visible: the part of the map that counts, where that is not all of it.
     """
     if residual is None:
         return WorldSampling("NONE")
-    moment, peak = contrast(residual)
+    moment, peak = contrast(residual, visible)
     if (moment - EVEN) * (1 - share) ** 2 <= CALM_ENOUGH:
         return WorldSampling("NONE")
     if cells:
@@ -93,11 +98,18 @@ def variance_of_suns(suns: Sequence[Sun], light: float) -> tuple[float, float]:
     return 16 * float(by_strength) + OTHERWISE, 16 * float(by_lot) + OTHERWISE
 
 
-def contrast(radiance: NDArray[np.float32]) -> tuple[float, float]:
-    """(mean(L^2) / mean(L)^2, max(L) / mean(L)) of a map's luminance over the sphere."""
+def contrast(
+    radiance: NDArray[np.float32], visible: VisiblePart | None = None
+) -> tuple[float, float]:
+    """(mean(L^2) / mean(L)^2, max(L) / mean(L)) of a map's luminance over the sphere, or over the
+    visible part of it."""
     lum = luminance(radiance)
-    solid = row_solid_angles(lum.shape[1], lum.shape[0]) / (4 * np.pi)
-    mean = float(lum.sum(axis=1) @ solid)
+    solid = sphere.row_solid_angles(lum.shape[1], lum.shape[0])
+    area = 4 * np.pi
+    if visible:
+        lum = visible.of(lum)
+        area = float(visible.pixels(lum.shape[1], lum.shape[0]).sum(axis=1) @ solid)
+    mean = float(lum.sum(axis=1) @ solid) / area
     if mean == 0:
         return 1.0, 1.0
-    return float((lum**2).sum(axis=1) @ solid) / mean**2, float(lum.max()) / mean
+    return float((lum**2).sum(axis=1) @ solid) / area / mean**2, float(lum.max()) / mean

@@ -107,9 +107,14 @@ class ConversionSettings:
         return self.target == "cycles"
 
     @property
+    def chooses_border(self) -> bool:
+        """Whether the border of region A is put where a path tracer sees least noise."""
+        return self.share is None and self.shadowed_residual
+
+    @property
     def takes_whole_lights(self) -> bool:
         """Whether specks of region A, and more lights than are allowed, stay in the residual."""
-        return self.method == "edge" and self.share is None and self.shadowed_residual
+        return self.method == "edge" and self.chooses_border
 
     @property
     def leaves_residual(self) -> bool:

@@ -8,17 +8,23 @@ means truer shadows, until too few suns stand for too much.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
 from . import sphere
-from .environment import EnvironmentMap, luminance
-from .noise import PER_OCTAVE, borders, squared_noise
+from .environment import EnvironmentMap
+from .memo import Memo
+from .noise import PER_OCTAVE, Borders, borders, squared_noise
 from .patches import patches_of
 from .placement.edge import edge_suns
 from .prediction import Prediction
 from .region import RegionLight, light_of_map
+from .residual import without
 from .settings import ConversionSettings
 from .strata import Strata, stratify, stratify_at
+from .visible import VisiblePart
 
 SHARES = (1.0, 0.95, 0.9, 0.8, 0.65, 0.5, 0.3)
 """What is tried, in this order, after whole peaks with their halo. Between two of them the error is
@@ -34,26 +40,48 @@ USUAL_LIGHTS = 16
 """For as many lights the share is chosen where their number is chosen after it."""
 
 
-def choose_strata(environment: EnvironmentMap, settings: ConversionSettings) -> Strata:
-    """The strata for a share that is given or chosen for the map, the lights and the target."""
+@dataclass(frozen=True, eq=False)
+class Seen(Memo):
+    """What counts of a map: its luminance, (height, width), and the borders it could be cut at."""
+
+    luminance: NDArray[np.float64]
+    borders: Borders
+
+    @classmethod
+    def of(cls, environment: EnvironmentMap, visible: VisiblePart | None) -> Seen:
+        lum = visible.of(environment.luminance) if visible else environment.luminance
+        return cls(lum, borders(lum, sphere.row_solid_angles(environment.width, len(lum))))
+
+    def strata(self, level: float, count: int) -> Strata:
+        return self.once((level, count), lambda: stratify_at(self.luminance, level, count))
+
+
+def choose_strata(
+    environment: EnvironmentMap, settings: ConversionSettings, visible: VisiblePart | None = None
+) -> Strata:
+    """The strata for a share that is given or chosen for the map, the lights and the target.
+
+    visible: what region A is chosen from, where it is chosen for least noise.
+    """
     if settings.share is not None:
-        return stratify(environment, settings.share, settings.strata)
+        choice = settings.share, settings.strata
+        return environment.latest("strata", choice, lambda: stratify(environment, *choice))
     if not settings.shadowed_residual:
         return _truest(environment, settings)
+    part = visible.key if visible else None
+    seen = environment.latest("seen", part, lambda: Seen.of(environment, visible))
     if settings.lights is not None:
-        return _calmest(environment, settings)
-    return stratify(environment, None, settings.strata)
+        return _calmest(environment, seen, settings)
+    return seen.strata(seen.borders.best_level, settings.strata)
 
 
-def _calmest(environment: EnvironmentMap, settings: ConversionSettings) -> Strata:
+def _calmest(environment: EnvironmentMap, seen: Seen, settings: ConversionSettings) -> Strata:
     """From the border of least noise upwards, as long as noise and wrong shadows become less."""
-    whole = light_of_map(environment.radiance)
-    lum = luminance(environment.radiance)
-    found = borders(lum, sphere.row_solid_angles(whole.width, whole.height))
-    best, least = stratify_at(lum, found.best_level, settings.strata), np.inf
+    found = seen.borders
+    best, least = seen.strata(found.best_level, settings.strata), np.inf
     for k in range(found.best, 0, -PER_OCTAVE):
-        strata = stratify_at(lum, float(found.level[k]), settings.strata)
-        wrong = _error(whole, strata, settings) ** 2
+        strata = seen.strata(float(found.level[k]), settings.strata)
+        wrong = _error(environment, strata, settings) ** 2
         noise = squared_noise(found.variance[k])
         if wrong + noise < least:
             best, least = strata, wrong + noise
@@ -64,14 +92,13 @@ def _calmest(environment: EnvironmentMap, settings: ConversionSettings) -> Strat
 
 def _truest(environment: EnvironmentMap, settings: ConversionSettings) -> Strata:
     """The share of least predicted error, where the rest of the map is seen from everywhere."""
-    whole = light_of_map(environment.radiance)
     best = stratify(environment, None, settings.strata)
-    least, before, rises = _error(whole, best, settings), np.inf, 0
+    least, before, rises = _error(environment, best, settings), np.inf, 0
     for share in SHARES:
         if share > MOST_OF_A_WORLD and settings.target == "eevee":
             continue
         strata = stratify(environment, share, settings.strata)
-        error = _error(whole, strata, settings)
+        error = _error(environment, strata, settings)
         if error < least:
             best, least = strata, error
         rises = rises + 1 if error > before else 0
@@ -81,29 +108,32 @@ def _truest(environment: EnvironmentMap, settings: ConversionSettings) -> Strata
     return best
 
 
-def _error(whole: RegionLight, strata: Strata, settings: ConversionSettings) -> float:
+def _error(environment: EnvironmentMap, strata: Strata, settings: ConversionSettings) -> float:
     """Predicted, for as many suns as are allowed."""
-    bright, dark = (
-        patches_of(part, part.luminous_flux, ROUGH) if len(part.pixels) else None
-        for part in _parted(whole, strata)
-    )
-    unshadowed = None if settings.shadowed_residual else dark
-    if bright is None:
+    bright = strata.once("bright", lambda: _about_region_a(environment, strata))
+    unshadowed = None
+    if not settings.shadowed_residual:
+        rest = light_of_map(without(environment, bright))
+        unshadowed = patches_of(rest, rest.luminous_flux, ROUGH)
+    if not len(bright.pixels):
         return Prediction.of(None, strata.light, unshadowed).error(()) if unshadowed else 0.0
-    suns = edge_suns(bright, strata, settings, settings.lights or USUAL_LIGHTS).suns
-    return Prediction.of(bright, strata.light, unshadowed).error(suns)
+    patches = bright.once("rough", lambda: patches_of(bright, bright.luminous_flux, ROUGH))
+    prediction = bright.latest(
+        "prediction", unshadowed, lambda: Prediction.of(patches, strata.light, unshadowed)
+    )
+    suns = edge_suns(patches, strata, settings, settings.lights or USUAL_LIGHTS).suns
+    return prediction.error(suns)
 
 
-def _parted(whole: RegionLight, strata: Strata) -> tuple[RegionLight, RegionLight]:
-    """About what suns get, and all the rest: what exceeds the mean along region A's border."""
-    luminance, region = strata.luminance.ravel(), strata.region_a
+def _about_region_a(environment: EnvironmentMap, strata: Strata) -> RegionLight:
+    """About what suns get: what exceeds the mean along region A's border."""
+    width, height = environment.width, environment.height
+    lum, region = strata.luminance.ravel(), strata.region_a.ravel()
     inside = np.flatnonzero(region)
-    near = sphere.neighbours(inside, whole.width, whole.height).ravel()
-    border = near[~region.ravel()[near]]
-    level = luminance[border].mean() if len(border) else 0.0
-    excess = np.where(region.ravel(), 1 - level / np.maximum(luminance, 1e-300), 0.0)
-    excess = np.maximum(excess, 0)
-    size = whole.width, whole.height
-    bright = RegionLight(whole.pixels, whole.flux * excess[:, None], *size)
-    dark = RegionLight(whole.pixels, whole.flux * (1 - excess)[:, None], *size)
-    return bright.part(excess > 0), dark.part((excess < 1) & (luminance > 0))
+    near = sphere.neighbours(inside, width, height).ravel()
+    border = near[~region[near]]
+    level = lum[border].mean() if len(border) else 0.0
+    excess = np.maximum(1 - level / np.maximum(lum[inside], 1e-300), 0)
+    solid = sphere.row_solid_angles(width, height)[inside // width]
+    flux = environment.radiance.reshape(-1, 3)[inside] * (excess * solid)[:, None]
+    return RegionLight(inside, flux, width, height).part(excess > 0)

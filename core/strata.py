@@ -7,17 +7,19 @@ half, hold the share 1 - X of the sum and make up region B; the bright ones hold
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
-from .environment import EnvironmentMap, luminance
+from .environment import EnvironmentMap
+from .memo import Memo
 from .noise import borders
 
 
 @dataclass(frozen=True, eq=False)
-class Strata:
+class Strata(Memo):
     """n strata of one map.
 
     luminance: float64 (height, width).
@@ -34,13 +36,13 @@ class Strata:
     def count(self) -> int:
         return len(self.bounds) + 1
 
-    @property
+    @cached_property
     def light(self) -> float:
         """Luminance of the whole map's scalar irradiance."""
         height, width = self.luminance.shape
         return float(self.luminance.sum(axis=1) @ sphere.row_solid_angles(width, height))
 
-    @property
+    @cached_property
     def part_on_ground(self) -> float:
         """Irradiance of level ground in the open as a part of all light, and a fortieth at least:
         where all light comes from below, nothing hangs on the ground."""
@@ -49,7 +51,7 @@ class Strata:
         facing = np.maximum(np.cos(sphere.centroid_angles(width, height)[1]), 0)
         return max(float(self.luminance.sum(axis=1) @ (solid * facing)) / self.light, 1 / 40)
 
-    @property
+    @cached_property
     def square(self) -> float:
         """4 pi (integral of luminance squared) / light^2; 1 for a constant map."""
         height, width = self.luminance.shape
@@ -61,7 +63,7 @@ class Strata:
         """Luminance above which a pixel belongs to region A."""
         return float(self.bounds[len(self.bounds) // 2])
 
-    @property
+    @cached_property
     def region_a(self) -> NDArray[np.bool_]:
         """Mask of region A, shape (height, width)."""
         return self.luminance > self.threshold
@@ -78,11 +80,12 @@ def stratify(environment: EnvironmentMap, share: float | None, count: int) -> St
         (see `noise`).
     Pixels of equal luminance stay together, so the share that comes out is the nearest possible.
     """
-    lum = luminance(environment.radiance)
+    lum = environment.luminance
     solid = sphere.row_solid_angles(environment.width, environment.height)
     if share is None:
         return stratify_at(lum, borders(lum, solid).best_level, count)
-    return stratify_at(lum, _Levels.of(lum, solid).bound_of_share(share), count)
+    levels = environment.once("levels", lambda: _Levels.of(lum, solid))
+    return stratify_at(lum, levels.bound_of_share(share), count)
 
 
 def stratify_at(lum: NDArray[np.float64], threshold: float, count: int) -> Strata:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
+from .memo import Memo
 from .noise import OTHERWISE, squared_noise
 from .placement.choice import choose_suns
 from .placement.placement import ChosenSuns
@@ -28,7 +29,7 @@ AS_CALM = 1.25
 
 
 @dataclass(frozen=True, eq=False)
-class WholeLights:
+class WholeLights(Memo):
     """The connected groups of region A, the brightest first.
 
     light: of all of them, rims included. rank: of each of its pixels' group, (p,). flux: luminous,
@@ -48,7 +49,7 @@ class WholeLights:
         return int(np.argmax(variance <= AS_CALM * variance[-1]))
 
     def brightest(self, count: int) -> RegionLight:
-        return self.light.part(self.rank < count)
+        return self.once(count, lambda: self.light.part(self.rank < count))
 
     def note(self, count: int, why: str) -> tuple[str, ...]:
         """A sentence about those that are not among the brightest `count`."""
@@ -68,7 +69,7 @@ def suns_for_whole_lights(
     Where as many suns as were asked for stand for it only badly, half of the spots at a time are
     left in the residual, down to one for each sun, if noise is the lesser evil.
     """
-    groups = whole_lights(light, strata)
+    groups = light.once("whole lights", lambda: whole_lights(light, strata))
     count, lights, least = groups.noisy, settings.most_lights, np.inf
     while True:
         chosen = choose_suns(groups.brightest(count), strata, settings)

@@ -25,13 +25,17 @@ def choose_suns(
 
     unshadowed: the rest of the map, where the target shows it without shadows.
     """
-    light = light.part(light.luminous_flux > 0)
+    light = light.lit
     rest = patches_of(unshadowed, unshadowed.luminous_flux) if unshadowed else None
     if not len(light.pixels):
         error = Prediction.of(None, strata.light, rest).error(()) if rest else 0.0
         return ChosenSuns((), error, (NO_SUN,) if settings.share is None else (), 0.0)
-    patches = patches_of(light, strata.luminance.ravel()[light.pixels])
-    prediction = Prediction.of(patches, strata.light, rest)
+    patches = light.once(
+        ("patches", strata), lambda: patches_of(light, strata.luminance.ravel()[light.pixels])
+    )
+    prediction = light.latest(
+        "prediction", (strata, rest), lambda: Prediction.of(patches, strata.light, rest)
+    )
 
     def with_lights(count: int) -> ChosenSuns:
         if settings.method == "edge":

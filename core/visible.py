@@ -1,0 +1,123 @@
+"""The part of a map whose light reaches what is looked at.
+
+What reaches nothing makes no noise and casts no shadow, wherever it is kept: it stays in the
+residual, so that the account closes and nothing is lost if the scene changes. Only the choice of
+region A leaves it out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import sphere
+from .environment import EnvironmentMap
+
+ROWS = 24
+"""Of cells, from pole to pole."""
+
+NEAR = np.radians(8)
+"""A cell is visible that has its centre so near to a direction from which light was found to come:
+about a cell's diagonal."""
+
+WORTH = 0.01
+"""As a part of the light that is known to reach something: more must not be overlooked at once."""
+
+MOST_LOOKS = 10_000
+"""To find out about cells that may be too bright to be overlooked; what takes more is visible."""
+
+RULE_OF_THREE = 3.0
+"""What was not met in n trials has, 19 times in 20, a chance of at most 3 / n (Hanley and
+Lippman-Hand, If Nothing Goes Wrong, Is Everything All Right?, 1983)."""
+
+_SIZE = 2 * ROWS, ROWS
+
+
+@dataclass(frozen=True, eq=False)
+class VisiblePart:
+    """cells: whether light from there may reach something, bool (ROWS, 2 ROWS), rows downwards."""
+
+    cells: NDArray[np.bool_]
+
+    @cached_property
+    def key(self) -> bytes:
+        """The same for the same part."""
+        return self.cells.tobytes()
+
+    def pixels(self, width: int, height: int) -> NDArray[np.bool_]:
+        """Which pixels of a map of this size are visible, (height, width)."""
+        return self.cells.ravel()[_cells_of_pixels(width, height)]
+
+    def of(self, plane: NDArray[np.floating]) -> NDArray[np.floating]:
+        """A map, (height, width) or (height, width, 3), without what is not visible."""
+        mask = self.pixels(plane.shape[1], plane.shape[0])
+        return plane * mask.reshape(mask.shape + (1,) * (plane.ndim - 2)).astype(plane.dtype)
+
+
+@dataclass(frozen=True, eq=False)
+class Looks:
+    """Looks from places that matter, in the directions of a map.
+
+    escaped: those that met nothing but the map, unit vectors (n, 3). count: of all looks, evenly
+    over the half sphere above each place. places: how many can be found. reaches: whether light
+    from a direction, (3,), comes to any of so many of them.
+    """
+
+    escaped: NDArray[np.float64]
+    count: int
+    places: int
+    reaches: Callable[[NDArray[np.float64], int], bool]
+
+
+def visible_part(environment: EnvironmentMap, looks: Looks) -> VisiblePart | None:
+    """What of a map is visible; None: all of it, or it cannot be told."""
+    if not len(looks.escaped):
+        return None
+    centres = sphere.pixel_centres(np.arange(2 * ROWS * ROWS), *_SIZE)
+    near = (centres @ looks.escaped.T).max(axis=1) > np.cos(NEAR)
+    if near.all():
+        return None
+    cells = near | _may_reach(environment, near, looks)
+    return None if cells.all() else VisiblePart(cells.reshape(ROWS, 2 * ROWS))
+
+
+def _may_reach(
+    environment: EnvironmentMap, near: NDArray[np.bool_], looks: Looks
+) -> NDArray[np.bool_]:
+    """Cells far from where light was found to come from that are yet too bright to leave out: seen
+    after all, or so bright that to find nothing proves nothing."""
+    lum = environment.luminance.ravel()
+    cell = _cells_of_pixels(environment.width, environment.height).ravel()
+    light = environment.once("light of cells", lambda: _light_of_cells(environment, cell))
+    size = np.repeat(sphere.row_solid_angles(*_SIZE), 2 * ROWS)
+    met = (light / size)[sphere.pixels_at(looks.escaped, *_SIZE)]
+    reaching = 2 * np.pi * met.sum() / looks.count
+    bright = np.flatnonzero(~near & (light > WORTH * reaching))
+    bright = bright[np.argsort(-light[bright], kind="stable")]
+    trials = np.ceil(RULE_OF_THREE * light[bright] / max(WORTH * reaching, 1e-300))
+    proven = trials <= looks.places
+    proven &= np.cumsum(np.where(proven, trials, 0)) <= MOST_LOOKS
+    for k in np.flatnonzero(proven):
+        pixels = np.flatnonzero(cell == bright[k])
+        brightest = pixels[[np.argmax(lum[pixels])]]
+        towards = sphere.pixel_centres(brightest, environment.width, environment.height)[0]
+        proven[k] = not looks.reaches(towards, int(trials[k]))
+    found = np.zeros(len(near), bool)
+    found[bright[~proven]] = True
+    return found
+
+
+def _light_of_cells(environment: EnvironmentMap, cell: NDArray[np.intp]) -> NDArray[np.float64]:
+    solid = sphere.row_solid_angles(environment.width, environment.height)
+    return np.bincount(cell, (environment.luminance * solid[:, None]).ravel(), 2 * ROWS * ROWS)
+
+
+def _cells_of_pixels(width: int, height: int) -> NDArray[np.intp]:
+    """The flat cell that each pixel of a map lies in, (height, width)."""
+    rows = (np.arange(height) * ROWS) // height
+    columns = (np.arange(width) * 2 * ROWS) // width
+    return rows[:, None] * 2 * ROWS + columns

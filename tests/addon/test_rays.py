@@ -1,0 +1,209 @@
+"""Lamps for what reaches a surface that the camera sees, and for nothing else."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from sunsplit.addon.rays import camera_width
+from sunsplit.addon.scene_needs import needs_of
+from tests.blender import (
+    add_mesh,
+    camera_towards,
+    diffuse,
+    fresh_scene,
+    hdri_world,
+    material,
+    plate_mesh,
+    suns,
+    to_light,
+    write_map,
+)
+from tests.maps import direction, paint_disc, sky
+
+ABOVE, BELOW = direction(40, 50), direction(-100, -50)
+
+
+@pytest.fixture(scope="module")
+def two_suns(tmp_path_factory):
+    """A map with one sun above the ground and one below."""
+    pixels = sky(256, 0.3)
+    for towards in (ABOVE, BELOW):
+        paint_disc(pixels, towards, 2, (900, 800, 700))
+    return write_map(tmp_path_factory.mktemp("maps") / "two.exr", pixels)
+
+
+@pytest.fixture
+def scene(two_suns):
+    """A wide ground, and a camera that looks down on it."""
+    made = fresh_scene()
+    hdri_world(made, two_suns)
+    add_mesh(made, plate_mesh(1000), diffuse("Ground", 0.5), Matrix())
+    camera_towards(made, np.array([1, 0, -1]), 40, 64).location = (0, 0, 3)
+    bpy.context.view_layer.update()
+    return made
+
+
+def heights(scene):
+    return sorted(to_light(lamp)[2] for lamp in suns(scene))
+
+
+def ground(scene):
+    return next(thing for thing in scene.objects if thing.type == "MESH")
+
+
+def test_a_sun_below_the_ground_is_no_lamp_and_stays_in_the_world(scene):
+    bpy.ops.sunsplit.convert()
+    assert heights(scene) == pytest.approx([ABOVE[2]], abs=1e-3)
+    assert "of the light reaches nothing that the camera shows" in scene.sunsplit.report
+    image = scene.world.node_tree.nodes["Sunsplit: Residual"].image
+    pixels = np.empty(256 * 128 * 4, np.float32)
+    image.pixels.foreach_get(pixels)  # rows upwards
+    pixels = pixels.reshape(128, 256, 4)[..., 0]
+    assert pixels[:64].max() > 500
+    assert pixels[64:].max() < 1
+    bpy.ops.sunsplit.convert(skips=False)
+    assert heights(scene) == pytest.approx([BELOW[2], ABOVE[2]], abs=1e-3)
+    assert "reaches nothing" not in scene.sunsplit.report
+
+
+def test_what_is_visible_turns_with_the_world(scene):
+    """Half a turn about X: the map's lower sun shines from above."""
+    tree = scene.world.node_tree
+    texture = next(n for n in tree.nodes if n.type == "TEX_ENVIRONMENT")
+    coordinates = tree.nodes.new("ShaderNodeTexCoord")
+    mapping = tree.nodes.new("ShaderNodeMapping")
+    mapping.inputs["Rotation"].default_value = (np.pi, 0, 0)
+    tree.links.new(coordinates.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
+    bpy.ops.sunsplit.convert()
+    assert heights(scene) == pytest.approx([-BELOW[2]], abs=1e-3)
+
+
+def let_light_through(scene):
+    shader = next(iter(ground(scene).data.materials))
+    tree = shader.node_tree
+    leaf = tree.nodes.new("ShaderNodeBsdfTranslucent")
+    output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
+    tree.links.new(leaf.outputs[0], output.inputs["Surface"])
+
+
+def cast_no_shadow(scene):
+    """And something below, which then is lit from above and below."""
+    ground(scene).visible_shadow = False
+
+
+def not_be_rendered(scene):
+    ground(scene).hide_render = True
+    add_mesh(scene, plate_mesh(0.4), diffuse("Plate", 0.5), Matrix.Translation((3, 0, 0)))
+    turned = Matrix.Translation((3, 0, 0.01)) @ Matrix.Rotation(1.5, 4, "Y")
+    add_mesh(scene, plate_mesh(0.4), diffuse("Wall", 0.5), turned)
+
+
+def move(scene):
+    ground(scene).keyframe_insert("location", frame=1)
+
+
+def move_camera(scene):
+    scene.camera.keyframe_insert("location", frame=1)
+
+
+def hide_from_the_viewport_only(scene):
+    plate = add_mesh(scene, plate_mesh(1), diffuse("Plate", 0.5), Matrix.Translation((9, 0, 9)))
+    plate.hide_viewport = True
+
+
+def fill_with_smoke(scene):
+    smoke = bpy.data.volumes.new("Smoke")
+    scene.collection.objects.link(bpy.data.objects.new("Smoke", smoke))
+
+
+def be_everywhere(scene):
+    empty = bpy.data.objects.new("Instance", None)
+    made = bpy.data.collections.new("Things")
+    made.objects.link(bpy.data.objects.new("Thing", plate_mesh(1)))
+    empty.instance_type, empty.instance_collection = "COLLECTION", made
+    scene.collection.objects.link(empty)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        let_light_through,
+        cast_no_shadow,
+        not_be_rendered,
+        move,
+        move_camera,
+        hide_from_the_viewport_only,
+        fill_with_smoke,
+        be_everywhere,
+    ],
+)
+def test_a_scene_that_light_from_below_may_reach_gets_both_lamps(scene, change):
+    change(scene)
+    bpy.context.view_layer.update()
+    bpy.ops.sunsplit.convert()
+    assert len(suns(scene)) == 2
+
+
+def test_through_a_window_only_what_is_in_front_of_it(two_suns):
+    """Five sides of a box: both suns are outside, one shines in."""
+    made = fresh_scene()
+    hdri_world(made, two_suns)
+    corners = np.array([(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)], float)
+    mesh = bpy.data.meshes.new("Box")
+    sides = [(0, 1, 3, 2), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
+    mesh.from_pydata(corners.tolist(), [], sides)
+    add_mesh(made, mesh, diffuse("Wall", 0.5), Matrix())
+    camera_towards(made, np.array([1.0, 0.2, 0]), 60, 64)
+    bpy.context.view_layer.update()
+    bpy.ops.sunsplit.convert()
+    assert heights(made) == pytest.approx([ABOVE[2]], abs=1e-3)
+
+
+def test_the_same_scene_is_seen_the_same_way_twice(scene):
+    first, second = (needs_of(scene).reach for _ in range(2))
+    assert first.escaped == second.escaped
+
+
+def test_the_width_that_a_camera_shows(scene):
+    """64 pixels across 40 degrees, at its corners finer than in the middle."""
+    half = np.tan(np.radians(20))
+    finest = 2 * half / 64 / (1 + 2 * half**2)
+    assert camera_width(scene) == pytest.approx(2 * 2 * np.pi / finest, abs=1)
+    scene.render.resolution_percentage = 50
+    assert camera_width(scene) == pytest.approx(2 * np.pi / finest, abs=1)
+    scene.camera.data.type = "ORTHO"
+    assert camera_width(scene) is None
+
+
+def test_a_lens_that_changes_may_show_any_width(scene):
+    scene.camera.data.keyframe_insert("lens", frame=1)
+    assert camera_width(scene) is None
+
+
+@pytest.mark.parametrize("mirrors", [False, True])
+def test_a_camera_gets_no_wider_a_map_than_it_can_show(two_suns, tmp_path, mirrors):
+    made = fresh_scene()
+    pixels = sky(4096, 0.3)
+    paint_disc(pixels, ABOVE, 2, (900, 800, 700), fine=2)
+    texture = hdri_world(made, write_map(tmp_path / "wide.exr", pixels))
+    camera_towards(made, np.array([1, 0, 0.3]), 90, 96)
+    if mirrors:
+        chrome = material("Chrome", (1, 1, 1), Metallic=1, Roughness=0)
+        add_mesh(made, plate_mesh(1), chrome, Matrix())
+    assert 1024 < camera_width(made) <= 2048
+    bpy.ops.sunsplit.convert()
+    nodes = made.world.node_tree.nodes
+    assert nodes["Sunsplit: Camera"].image.size[0] == 2048
+    assert nodes["Sunsplit: Camera"].image.name == f"{texture.image.name.split('.')[0]} camera"
+    assert nodes["Sunsplit: Residual"].image.size[0] == (2048 if mirrors else 1024)
+    assert "gets a map that wide instead of 4096" in made.sunsplit.report
+    bpy.ops.sunsplit.convert(skips=False)
+    assert "Sunsplit: Camera" not in made.world.node_tree.nodes
+    assert made.world.node_tree.nodes["Sunsplit: Residual"].image.size[0] == 4096
+    bpy.ops.sunsplit.convert()
+    bpy.ops.sunsplit.restore()
+    assert [image.size[0] for image in bpy.data.images if image.size[0]] == [4096]
