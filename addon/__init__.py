@@ -8,6 +8,7 @@ from . import command, operators, panel, properties
 
 CLASSES = (
     properties.SunsplitLamp,
+    properties.SunsplitBeforePasses,
     properties.SunsplitSettings,
     operators.SUNSPLIT_OT_convert,
     operators.SUNSPLIT_OT_restore,

@@ -23,11 +23,11 @@ class SUNSPLIT_OT_convert(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        from .scene import convert_scene, settings_for
+        from .scene import convert_scene, options_for, settings_for
 
         chosen = self._chosen(context.scene.sunsplit)
         try:
-            result = convert_scene(context.scene, settings_for(chosen), bool(chosen["skips"]))
+            result = convert_scene(context.scene, settings_for(chosen), options_for(chosen))
         except SunsplitError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

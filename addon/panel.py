@@ -80,7 +80,9 @@ def draw_settings(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
         _row(layout, settings, "residual_samples", rest)
     if settings.residual != "none":
         _row(layout, settings, "residual_width", rest)
-    layout.prop(settings, "skips")
+    layout.separator()
+    for name in ("skips", "two_passes", "light_groups"):
+        layout.prop(settings, name)
 
 
 def _row(

@@ -193,6 +193,20 @@ CHOICES = {
         default=True,
         options=_FRESH,
     ),
+    "two_passes": BoolProperty(
+        name="Two Passes",
+        description="Lamps and world as two view layers, each with the samples that its noise asks "
+        "for, added in the compositor (Cycles)",
+        default=False,
+        options=_FRESH,
+    ),
+    "light_groups": BoolProperty(
+        name="Light Groups",
+        description="Lamps in the light group Suns and the world in Sky, to balance them after the "
+        "render (Cycles)",
+        default=False,
+        options=_FRESH,
+    ),
 }
 """The settings of a conversion, once: for the scene and as arguments of the operator."""
 
@@ -201,6 +215,24 @@ class SunsplitLamp(bpy.types.PropertyGroup):
     """One lamp of a conversion: known by itself, not by a name or mark that a copy has too."""
 
     __annotations__ = {"lamp": PointerProperty(type=bpy.types.Object)}
+
+
+class SunsplitBeforePasses(bpy.types.PropertyGroup):
+    """What two passes have changed, and what they have made for it.
+
+    samples: of the user's view layer. use_layer_samples: empty, where there are no two passes.
+    compositor: what our nodes are in, from Blender 5 on; before, a scene has one of its own.
+    """
+
+    __annotations__ = {
+        "samples": IntProperty(),
+        "use_layer_samples": StringProperty(),
+        "use_compositing": BoolProperty(),
+        "use_single_layer": BoolProperty(),
+        "use_nodes": BoolProperty(),
+        "black_world": PointerProperty(type=bpy.types.World),
+        "compositor": PointerProperty(type=bpy.types.NodeTree),
+    }
 
 
 class SunsplitSettings(bpy.types.PropertyGroup):
@@ -220,6 +252,7 @@ class SunsplitSettings(bpy.types.PropertyGroup):
         "light_tree_off": BoolProperty(
             name="Light Tree Off", description="Restore switches Cycles' light tree on again"
         ),
+        "before_passes": PointerProperty(type=SunsplitBeforePasses),
         "report": StringProperty(
             name="Report", description="What the last conversion did, a sentence a line"
         ),

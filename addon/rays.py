@@ -11,6 +11,7 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from ..core.visible import Looks
+from .passes import users_layers
 
 PICTURE = 48, 27
 """Rays through a camera's picture that look for the world."""
@@ -184,7 +185,7 @@ def stands_still(scene: bpy.types.Scene, shown: Iterable[bpy.types.Object]) -> b
         return False
     if any(marker.camera for marker in scene.timeline_markers) or scene.render.use_multiview:
         return False
-    if len(scene.view_layers) > 1:
+    if len(users_layers(scene)) > 1:
         return False
     if any(made.hide_render for made in scene.collection.children_recursive):
         return False

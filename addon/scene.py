@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import bpy
@@ -11,11 +11,14 @@ import bpy
 from ..core.conversion import Conversion
 from ..core.environment import LUMINANCE_WEIGHTS, EnvironmentMap
 from ..core.errors import UnusableInput
+from ..core.passes import parts_of, samples_of_passes
 from ..core.sampling import needs_light_tree
 from ..core.settings import ConversionSettings
 from ..core.visible import VisiblePart, visible_part
+from . import passes
 from .known import known_conversion
 from .lamps import link_lamps, make_lamps, remove_lamps, unlink_lamps
+from .light_groups import put_into_groups, remove_groups
 from .scene_needs import ALL, SceneNeeds, needs_of
 from .trace import TAG
 from .world import (
@@ -31,6 +34,19 @@ from .world import (
 
 LEAST_SAID = 0.0005
 """Of all light: less of it that reaches nothing is not worth a sentence."""
+
+
+@dataclass(frozen=True)
+class SceneOptions:
+    """What a scene may choose besides what becomes of its map.
+
+    skips: what the scene does not need, as it is now, is left out. two_passes, light_groups: see
+    the modules of these names.
+    """
+
+    skips: bool = True
+    two_passes: bool = False
+    light_groups: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +66,8 @@ class SceneConversion:
 
 def settings_for(chosen: Mapping[str, Any]) -> ConversionSettings:
     """The values of the panel, by the names of `properties.CHOICES`, as the core wants them."""
-    values = dict(chosen)
-    values.pop("skips")
+    options = {field.name for field in fields(SceneOptions)}
+    values = {name: value for name, value in chosen.items() if name not in options}
     share = None if values.pop("share_auto") else float(values["share"])
     return ConversionSettings(
         **values
@@ -68,12 +84,17 @@ def settings_for(chosen: Mapping[str, Any]) -> ConversionSettings:
     )
 
 
+def options_for(chosen: Mapping[str, Any]) -> SceneOptions:
+    """The rest of what `settings_for` takes."""
+    return SceneOptions(**{field.name: bool(chosen[field.name]) for field in fields(SceneOptions)})
+
+
 def convert_scene(
-    scene: bpy.types.Scene, settings: ConversionSettings, skips: bool = True
+    scene: bpy.types.Scene,
+    settings: ConversionSettings,
+    options: SceneOptions = SceneOptions(),
 ) -> SceneConversion:
     """Replace a scene's world and add lamps.
-
-    skips: whether what the scene does not need, as it is now, is left out.
 
     A converted world is converted again as the user has left it, turned or with another map;
     what Restore brings back stays the world that there was first. A world that the user has
@@ -89,8 +110,11 @@ def convert_scene(
             f'The world "{world.name}" is already converted, by another scene or file: '
             "restore it there, or choose the original world."
         )
+    if options.two_passes:
+        passes.check(scene)
     light = find_light(world, scene.render.engine)
-    needs = needs_of(scene) if skips else ALL
+    found = needs_of(scene)
+    needs = found if options.skips else ALL
     environment = read_image(light.image)
     needed = _without_excess(settings, environment.width, needs)
     conversion = known_conversion(environment, needed, _visible(environment, light, needs))
@@ -103,13 +127,17 @@ def convert_scene(
         *_warnings(scene, world, original, light),
     ]
     new = converted_world(world, light, conversion, needs.camera_sees_world, camera_width)
-    lamps = make_lamps(conversion.suns, light, world)
+    lamps = make_lamps(conversion.suns, light, new)
     # From here on `light` must not be used: its nodes go with the world that is replaced.
     restore_scene(scene)
     name_images(new, conversion.environment.name)
     result = _install(scene, original, conversion, new, lamps)
     if tree_off:
         scene.cycles.use_light_tree, state.light_tree_off = False, True
+    if options.two_passes:
+        sentences += _add_pass(scene, conversion, found.other_lights)
+    if options.light_groups:
+        put_into_groups(scene.view_layers, new, lamps)
     state.report = "\n".join([result.headline, *sentences])
     return result
 
@@ -142,6 +170,23 @@ def _is_without_light_tree(
         return False  # as the user has it
     light = float(conversion.account.source @ LUMINANCE_WEIGHTS)
     return not needs_light_tree(conversion.suns, light)
+
+
+def _add_pass(scene: bpy.types.Scene, conversion: Conversion, other_lights: bool) -> list[str]:
+    """Move the lamps into a pass of their own; what was done."""
+    if not conversion.suns:
+        return ["One pass: without lamps there is nothing to show in a second one."]
+    parts = parts_of(conversion, by_strength=scene.cycles.use_light_tree)
+    whole = passes.samples_of_scene(scene)
+    number = passes.PassSamples(*samples_of_passes(whole, *parts))
+    layer = passes.add_suns_layer(scene, scene.sunsplit.collection, number, other_lights)
+    lines = [
+        f"Two passes: {number.suns} samples for the suns, {number.sky} for the sky.",
+        f'The view layer "{layer.name}" has the lamps: choose it to see or change them.',
+    ]
+    if other_lights:
+        lines.append("Other lights shine too, so the suns' pass is a light group, not denoised.")
+    return lines
 
 
 def _skipped(
@@ -229,7 +274,7 @@ def _warnings(
         lines.append(
             f"The world is animated: the lamps stay as they are at frame {scene.frame_current}."
         )
-    for layer in scene.view_layers:
+    for layer in passes.users_layers(scene):
         if layer.world_override not in (None, world, original):
             lines.append(
                 f'View layer "{layer.name}" has a world of its own: '
@@ -253,6 +298,8 @@ def restore_scene(scene: bpy.types.Scene) -> None:
         if scene.world == converted:
             scene.world = original
         _swap_overrides(scene, converted, original)
+    passes.remove_suns_layer(scene)
+    remove_groups(scene.view_layers)
     state.original_world = state.converted_world = state.collection = None
     state.lamps.clear()
     state.report = ""

@@ -15,6 +15,7 @@ from ..core.environment import EnvironmentMap, environment_from_pixels
 from ..core.errors import CannotWrite, UnusableInput
 from ..core.sampling import WorldSampling, choose_sampling
 from .known import known_map
+from .light_groups import take_out_of_groups
 from .mapping import map_from_world
 from .trace import TAG, Place, lighting_textures
 
@@ -148,6 +149,7 @@ def converted_world(
     """
     new = world.copy()
     new[TAG] = True
+    take_out_of_groups(new)
     try:
         tree = new.node_tree
         for outer in light.texture.stack:
@@ -176,6 +178,16 @@ def converted_world(
     # EEVEE would take a second sun out of the residual.
     new.sun_threshold = 0.0
     return new
+
+
+def black_world() -> bpy.types.World:
+    """A world without any light."""
+    world = bpy.data.worlds.new("Sunsplit Black")
+    world[TAG] = True
+    if bpy.app.version < (5, 0):
+        world.use_nodes = True
+    world.node_tree.nodes.clear()
+    return world
 
 
 def _strip(tree: bpy.types.NodeTree) -> None:
@@ -312,5 +324,6 @@ def unconverted(world: bpy.types.World) -> bpy.types.World:
     for tree in trees:
         _strip(tree)
         trees += [n.node_tree for n in tree.nodes if n.type == "GROUP" and n.node_tree]
+    take_out_of_groups(world)
     del world[TAG]
     return world

@@ -77,15 +77,25 @@ def needs_light_tree(suns: Sequence[Sun], light: float) -> bool:
 
     light: luminance of the whole map's scalar irradiance.
     """
-    if len(suns) <= 1:
+    count = len(suns)
+    if count <= 1:
         return False
+    by_strength, by_lot = variance_of_suns(suns, light)
+    return by_strength * (1 + TIME_BY_TREE * count) < by_lot * (1 + TIME_BY_LOT * count)
+
+
+def variance_of_suns(suns: Sequence[Sun], light: float) -> tuple[float, float]:
+    """Of a sample that chooses one of these suns by its strength, and by lot (see `noise`).
+
+    light: luminance of the whole map's scalar irradiance.
+    """
     flux = np.array([sun.scalar_irradiance for sun in suns]) @ LUMINANCE_WEIGHTS / light
     each = flux[:, None] * harmonics(np.array([sun.to_light for sun in suns]))
-    together, count = each.sum(axis=0), len(suns)
+    together = each.sum(axis=0)
     seen = mean_square_irradiance(together)
-    by_strength = 16 * (square_from_one_place(together) - seen) + OTHERWISE
-    by_lot = 16 * (count * square_from_one_place(each).sum() - seen) + OTHERWISE
-    return bool(by_strength * (1 + TIME_BY_TREE * count) < by_lot * (1 + TIME_BY_LOT * count))
+    by_strength = square_from_one_place(together) - seen
+    by_lot = len(suns) * square_from_one_place(each).sum() - seen
+    return 16 * float(by_strength) + OTHERWISE, 16 * float(by_lot) + OTHERWISE
 
 
 def contrast(

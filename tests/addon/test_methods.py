@@ -82,7 +82,13 @@ def test_every_setting_of_the_core_is_a_choice_with_the_same_default(scene):
 
     own = {name: getattr(scene.sunsplit, name) for name in CHOICES}
     assert settings_for(own) == ConversionSettings()
-    assert set(CHOICES) == {*asdict(ConversionSettings()), "share_auto", "skips"}
+    assert set(CHOICES) == {
+        *asdict(ConversionSettings()),
+        "share_auto",
+        "skips",
+        "two_passes",
+        "light_groups",
+    }
 
 
 def test_an_automatic_fill_or_a_chosen_one(scene, sunrise):

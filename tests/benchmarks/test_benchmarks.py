@@ -15,6 +15,7 @@ from tests.benchmarks import (
     region_a,
     shares,
     table1,
+    two_passes,
     voronoi,
 )
 
@@ -49,6 +50,16 @@ def test_light_tree(tmp_path, sunrise):
     assert [one.lamps for one in results] == sorted(one.lamps for one in results)
     assert all(min(*one.noise, *one.seconds) > 0 for one in results)
     assert "| product |" in (tmp_path / "light_tree.md").read_text()
+
+
+def test_two_passes(tmp_path, sunrise):
+    few = ["--size", "16", "--samples", "8", "--repeats", "2", "--scenes", "outdoor"]
+    (result,) = two_passes.main([str(sunrise), *few, "-o", str(tmp_path)])
+    assert result.cost > 0
+    assert sum(result.two.samples) >= 2
+    # What suns and sky show, each alone, is what they show together.
+    assert result.suns.mean + result.sky.mean == pytest.approx(result.one.mean, rel=0.02)
+    assert "| outdoor |" in (tmp_path / "two_passes.md").read_text()
 
 
 def test_methods(tmp_path, sunrise):
