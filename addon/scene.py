@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from ..core.conversion import Conversion
-from ..core.environment import LUMINANCE_WEIGHTS, EnvironmentMap
+from ..core.environment import EnvironmentMap
 from ..core.errors import UnusableInput
 from ..core.passes import parts_of, samples_of_passes
 from ..core.sampling import needs_light_tree
@@ -113,7 +113,7 @@ def convert_scene(
     if options.two_passes:
         passes.check(scene)
     light = find_light(world, scene.render.engine)
-    found = needs_of(scene)
+    found = needs_of(scene) if options.skips or options.two_passes else ALL
     needs = found if options.skips else ALL
     environment = read_image(light.image)
     needed = _without_excess(settings, environment.width, needs)
@@ -168,8 +168,7 @@ def _is_without_light_tree(
         return False
     if not scene.cycles.use_light_tree and not scene.sunsplit.light_tree_off:
         return False  # as the user has it
-    light = float(conversion.account.source @ LUMINANCE_WEIGHTS)
-    return not needs_light_tree(conversion.suns, light)
+    return not needs_light_tree(conversion.suns, conversion.strata.light)
 
 
 def _add_pass(scene: bpy.types.Scene, conversion: Conversion, other_lights: bool) -> list[str]:

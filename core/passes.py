@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .conversion import Conversion
-from .environment import LUMINANCE_WEIGHTS
 from .noise import OF_TABLE, OTHERWISE
 from .sampling import EVEN, choose_sampling, contrast, variance_of_suns
 from .suns import Sun
+from .visible import VisiblePart
 
 COST_OF_SUNS, COST_OF_SKY = 0.8, 0.5
 """Time of a sample of each pass, in that of a sample of suns and residual together: without suns
@@ -44,29 +44,31 @@ def parts_of(conversion: Conversion, by_strength: bool) -> tuple[PassPart, PassP
 
     by_strength: how one of the suns is chosen, see `sampling.needs_light_tree`.
     """
-    account, cells = conversion.account, conversion.settings.residual == "voronoi"
-    light = float(account.source @ LUMINANCE_WEIGHTS)
+    cells, visible = conversion.settings.residual == "voronoi", conversion.visible
     return (
-        part_of_suns(conversion.suns, light, by_strength),
-        part_of_residual(conversion.residual, account.share, cells),
+        part_of_suns(conversion.suns, conversion.strata.light, by_strength),
+        part_of_residual(conversion.residual, conversion.visible_share, cells, visible),
     )
 
 
 def part_of_suns(suns: Sequence[Sun], light: float, by_strength: bool) -> PassPart:
-    """light: luminance of the whole map's scalar irradiance."""
+    """light: luminance of the scalar irradiance of all that is visible."""
     strength, lot = variance_of_suns(suns, light)
     return PassPart(strength if by_strength else lot, COST_OF_SUNS)
 
 
 def part_of_residual(
-    residual: NDArray[np.float32] | None, share: float, cells: bool = False
+    residual: NDArray[np.float32] | None,
+    share: float,
+    cells: bool = False,
+    visible: VisiblePart | None = None,
 ) -> PassPart:
-    """share, cells: see `choose_sampling`."""
+    """share, cells, visible: see `choose_sampling`."""
     if residual is None:
         return PassPart(EVENLY * OTHERWISE, COST_OF_SKY)
-    moment, _ = contrast(residual)
+    moment, _ = contrast(residual, visible)
     variance, cost = max(moment - EVEN, 0.0) * (1 - share) ** 2, COST_OF_SKY
-    if choose_sampling(residual, share, cells).method != "NONE":
+    if choose_sampling(residual, share, cells, visible).method != "NONE":
         # Rays look for light in the residual's table as they do for suns.
         variance, cost = min(variance, OF_TABLE), COST_OF_SUNS
     return PassPart(EVENLY * (variance + OTHERWISE), cost)

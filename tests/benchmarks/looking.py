@@ -21,7 +21,7 @@ import numpy as np
 from mathutils import Matrix
 
 from sunsplit.addon import known
-from sunsplit.addon.scene import convert_scene, restore_scene
+from sunsplit.addon.scene import SceneOptions, convert_scene, restore_scene
 from sunsplit.addon.scene_needs import needs_of
 from sunsplit.core.settings import ConversionSettings
 from tests.benchmarks.equal_error import enlarged
@@ -94,7 +94,8 @@ def overhead(path: Path, options: argparse.Namespace) -> tuple[float, float]:
         for repeat in range(2 * options.repeats):
             skips = bool(repeat % 2)
             known.forget()
-            made = seconds(lambda s=skips: convert_scene(scene, ConversionSettings(), s))
+            options_now = SceneOptions(skips=skips)
+            made = seconds(lambda o=options_now: convert_scene(scene, ConversionSettings(), o))
             if skips and "Skipped" in scene.sunsplit.report:
                 raise AssertionError(scene.sunsplit.report)
             made += timed_render(scene, Path(name), options.samples, 0)[1]
