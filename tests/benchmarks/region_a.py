@@ -20,7 +20,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from sunsplit.addon.scene import convert_scene
+from sunsplit.addon.scene import SceneOptions, convert_scene
 from sunsplit.addon.world import find_light, read_image
 from sunsplit.core.environment import luminance
 from sunsplit.core.noise import borders
@@ -127,7 +127,8 @@ def set_up(scene: bpy.types.Scene, row: Row) -> tuple[int, float, float, float]:
     facts = 0, 0.0, 0.0, 0.0
     if row.times is not None:
         share = None if row.sampling == "as set" else share_above(scene, row.times)
-        conversion = convert_scene(scene, ConversionSettings(share=share)).conversion
+        options = SceneOptions(skips=False)  # the map alone decides
+        conversion = convert_scene(scene, ConversionSettings(share=share), options).conversion
         facts = (
             len(conversion.suns),
             conversion.account.share,

@@ -198,7 +198,7 @@ def prepare(scene: bpy.types.Scene, settings: ConversionSettings | None, path: P
     facts = {}
     if settings is not None:
         started = time.perf_counter()
-        conversion = convert_scene(scene, settings).conversion
+        conversion = convert_scene(scene, settings, SceneOptions(skips=False)).conversion
         facts = {
             "seconds": time.perf_counter() - started,
             "lamps": len(conversion.suns),

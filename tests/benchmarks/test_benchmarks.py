@@ -7,10 +7,12 @@ import sys
 import numpy as np
 import pytest
 
+from sunsplit.core.files.maps import load
 from tests.benchmarks import (
     equal_error,
     light_tree,
     lights,
+    looking,
     methods,
     region_a,
     shares,
@@ -32,6 +34,28 @@ def test_region_a(tmp_path, monkeypatch, sunrise):
     shares = [float(rows[f"{times:g} x, NONE"][2]) for times in region_a.TIMES]
     assert shares == sorted(shares)
     assert float(rows["1 x, as set"][2]) == pytest.approx(shares[3], abs=0.01)
+
+
+def test_looking(tmp_path, sunrise):
+    few = ["--width", "0", "--side", "20", "--objects", "30", "--size", "8", "--samples", "1"]
+    results = looking.main([str(sunrise), *few, "--repeats", "1", "-o", str(tmp_path)])
+    assert all(one.seconds > 0 for one in results)
+    lines = (tmp_path / "looking.md").read_text().splitlines()
+    assert sum(line.startswith("| ") for line in lines) == 2 + len(results)
+
+
+def test_equal_error_of_an_enlarged_map(tmp_path, sunrise):
+    few = ["--scenes", "product", "--size", "16", "--samples", "1", "4", "--by-hand"]
+    few += ["--width", "2048", "--reference", "16", "-o", str(tmp_path), "--name", "wide"]
+    plain, split = equal_error.main([str(sunrise), *few])
+    assert plain.memory > split.memory > 0
+    assert (tmp_path / "wide.png").stat().st_size > 0
+
+
+def test_an_enlarged_map_keeps_its_light(tmp_path, sunrise):
+    wide, own = load(equal_error.enlarged(sunrise, 2048, tmp_path)), load(sunrise)
+    assert wide.width == 2 * own.width
+    assert wide.scalar_irradiance == pytest.approx(own.scalar_irradiance, rel=0.01)
 
 
 def test_equal_error(tmp_path, sunrise):
