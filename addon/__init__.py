@@ -1,6 +1,7 @@
 """The Blender side: settings, operators, panel. Everything heavy is imported when it is used."""
 
 import atexit
+import sys
 
 import bpy
 
@@ -36,3 +37,6 @@ def unregister() -> None:
     del bpy.types.Scene.sunsplit
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
+    known = sys.modules.get(f"{__name__}.known")
+    if known is not None:  # it was used
+        known.forget()

@@ -137,11 +137,13 @@ class Reach:
         )
 
     def is_reached(self, direction: Vector, count: int) -> bool:
-        """Whether light from a direction comes to any of so many places."""
+        """Whether light from a direction comes to any of so many places, or may do."""
         for _ in range(count):  # a path that meets nothing finds no place
             if len(self.places) >= count:
                 break
             self._follow_another()
+        if len(self.places) < count:
+            return True  # it cannot be told
         some = np.linspace(0, len(self.places), count, endpoint=False).astype(int)
         return any(
             place.normal.dot(direction) > 0 and self.sight.cast(place.point, direction) is None
@@ -218,7 +220,9 @@ def is_all_met(scene: bpy.types.Scene, shown: Iterable[bpy.types.Object]) -> boo
     """Whether rays meet every surface that renders show, and soon enough."""
     shown = list(shown)
     return len(shown) <= MOST_OBJECTS and all(
-        thing.type in SOLID and thing.instance_type == "NONE" and thing.visible_get()
+        thing.type in SOLID
+        and thing.instance_type == "NONE"
+        and (thing.type != "MESH" or thing.visible_get())
         for thing in shown
     )
 
