@@ -16,7 +16,7 @@ from .passes import users_layers
 PICTURE = 48, 27
 """Rays through a camera's picture that look for the world."""
 
-PLACES = 1000
+PLACES = 500
 """Where paths through the picture end that tell what is visible: three looks from each miss no
 more than a few degrees."""
 

@@ -146,9 +146,10 @@ def _without_excess(
     settings: ConversionSettings, width: int, needs: SceneNeeds
 ) -> ConversionSettings:
     """With a narrower residual where nothing could tell it from one as wide as the map."""
-    if settings.residual_width is not None:
+    narrower = needs.residual_width(width)
+    if settings.residual_width is not None or narrower == width:
         return settings
-    return replace(settings, residual_width=needs.residual_width(width))
+    return replace(settings, residual_width=narrower)
 
 
 def _visible(
@@ -207,7 +208,7 @@ def _skipped(
     shown = needs.width_for_camera(own)
     if not needs.camera_sees_world:
         lines.append("Skipped: the camera does not see the world, so renders do not load the HDRI.")
-    elif shown is not None:
+    elif shown != own:
         lines.append(
             f"Skipped: at this resolution the camera shows no more than {shown} pixels around, so "
             f"it gets a map that wide instead of {own}."

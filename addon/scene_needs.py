@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import bpy
 
+from ..core.environment import whole_part, whole_part_from
 from .rays import Reach, Sight, camera_width, is_all_met, stands_still
 
 SHARP = 0.25
@@ -39,28 +40,17 @@ class SceneNeeds:
     camera_width: int | None = None
     reach: Reach | None = field(default=None, compare=False)
 
-    def width_for_camera(self, width: int) -> int | None:
-        """Of the map that the camera sees, for a map of this width; None: as wide."""
-        return _narrower(width, self.camera_width) if self.camera_width else None
+    def width_for_camera(self, width: int) -> int:
+        """Of the map that the camera sees, for a map of this width."""
+        return whole_part_from(width, self.camera_width) if self.camera_width else width
 
-    def residual_width(self, width: int) -> int | None:
-        """Of the map that lights, for a map of this width; None: as wide."""
+    def residual_width(self, width: int) -> int:
+        """Of the map that lights, for a map of this width."""
         if not self.mirrors:
-            return _narrower(width, LIGHTING_WIDTH // 2, LIGHTING_WIDTH)
-        if self.camera_width:
-            return _narrower(width, max(self.camera_width, LIGHTING_WIDTH))
-        return None
-
-
-def _narrower(width: int, least: int, wanted: int = 0) -> int | None:
-    """The narrowest whole part of a width that is at least so wide, or the widest up to what is
-    wanted; None: the width itself."""
-    if width <= wanted:
-        return None
-    parts = [width // n for n in range(2, width // least + 1) if width % (2 * n) == 0]
-    if wanted:
-        parts = [part for part in parts if part <= wanted][:1]
-    return parts[-1] if parts else None
+            return whole_part(width, LIGHTING_WIDTH)
+        if self.camera_width is None:
+            return width
+        return whole_part_from(width, max(self.camera_width, LIGHTING_WIDTH))
 
 
 ALL = SceneNeeds(camera_sees_world=True, mirrors=True, other_lights=True)

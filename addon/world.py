@@ -19,6 +19,9 @@ from .light_groups import take_out_of_groups
 from .mapping import map_from_world
 from .trace import TAG, Place, lighting_textures
 
+UNCOMPRESSED = 1024
+"""Pixels of a map's width up to which it is packed as it is: 6 MB at most."""
+
 LINEAR_SPACES = ("Linear ", "Non-Color", "ACEScg", "ACES2065-1", "scene_linear")
 """How the names of colour spaces begin in which numbers are light."""
 
@@ -113,7 +116,8 @@ def packed_image(radiance: NDArray[np.float32], kind: str) -> bpy.types.Image:
     try:
         with tempfile.TemporaryDirectory(prefix="sunsplit-") as folder:
             path = Path(folder) / "map.exr"
-            exr.write(path, radiance)
+            # Small maps are written often, and as fast as may be.
+            exr.write(path, radiance, compressed=radiance.shape[1] > UNCOMPRESSED)
             image = bpy.data.images.load(str(path))
             # Our own writer and Blender's packing keep the values; Image.save() would encode them.
             image.pack()
@@ -144,7 +148,7 @@ def converted_world(
     rays where the camera does not see it: then Cycles does not load the map.
 
     world: what `light` was found in; when it is a converted one, the copy loses what that
-    conversion has put in. camera_width: of the map that the camera sees, None for the map itself.
+    conversion has put in. camera_width: of the map that the camera sees, None for the map's own.
     Nothing is left behind when this fails.
     """
     new = world.copy()
@@ -166,7 +170,7 @@ def converted_world(
         mix = _insert(tree, texture, image, interpolation, -300)
         if camera_sees_it:
             _show_camera(mix)
-        if camera_sees_it and camera_width is not None:
+        if camera_sees_it and camera_width not in (None, conversion.environment.width):
             narrow = packed_image(
                 conversion.environment.narrowed(camera_width).astype(np.float32), "camera"
             )

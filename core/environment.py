@@ -183,6 +183,20 @@ def scalar_irradiance(radiance: NDArray[np.floating]) -> NDArray[np.float64]:
     return sphere.row_solid_angles(width, height) @ rows
 
 
+def whole_part(width: int, most: int) -> int:
+    """The widest whole part of a width that is at most so wide and even, if there is one that is
+    not narrower than half of that; else the width itself."""
+    parts = (width // n for n in range(1, 2 * width // most + 1) if width % (2 * n) == 0)
+    return next((part for part in parts if part <= most), width)
+
+
+def whole_part_from(width: int, least: int) -> int:
+    """The narrowest whole part of a width that is at least so wide and even, if there is one; else
+    the width itself."""
+    parts = (width // n for n in range(width // least, 1, -1) if width % (2 * n) == 0)
+    return next(parts, width)
+
+
 def narrowed(radiance: NDArray[np.float32], width: int) -> NDArray[np.float64]:
     """A map of another width, each pixel the mean of those it replaces.
 

@@ -9,12 +9,13 @@ means truer shadows, until too few suns stand for too much.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
-from .environment import EnvironmentMap
+from .environment import EnvironmentMap, whole_part
 from .memo import Memo
 from .noise import PER_OCTAVE, Borders, borders, squared_noise
 from .patches import patches_of
@@ -33,6 +34,9 @@ flat; once it has risen twice, it goes on rising."""
 MOST_OF_A_WORLD = 0.95
 """Where the residual is a scene's world: mirrors must have something to show."""
 
+WIDE = 1024
+"""Pixels of a map's width with which borders are compared."""
+
 ROUGH = 4096
 """Patches with which shares are compared: their order is what counts."""
 
@@ -42,15 +46,29 @@ USUAL_LIGHTS = 16
 
 @dataclass(frozen=True, eq=False)
 class Seen(Memo):
-    """What counts of a map: its luminance, (height, width), and the borders it could be cut at."""
+    """What counts of a map: the luminance of what is visible, (height, width)."""
 
-    luminance: NDArray[np.float64]
-    borders: Borders
+    environment: EnvironmentMap
+    visible: VisiblePart | None
 
-    @classmethod
-    def of(cls, environment: EnvironmentMap, visible: VisiblePart | None) -> Seen:
-        lum = visible.of(environment.luminance) if visible else environment.luminance
-        return cls(lum, borders(lum, sphere.row_solid_angles(environment.width, len(lum))))
+    @cached_property
+    def luminance(self) -> NDArray[np.float64]:
+        lum = self.environment.luminance
+        return self.visible.of(lum) if self.visible else lum
+
+    @cached_property
+    def borders(self) -> Borders:
+        """That the map could be cut at."""
+        return borders(self.luminance, sphere.row_solid_angles(*self.luminance.shape[::-1]))
+
+    @cached_property
+    def rough(self) -> Seen:
+        """The same of a map that is at most WIDE."""
+        width = whole_part(self.environment.width, WIDE)
+        if width == self.environment.width:
+            return self
+        radiance = self.environment.narrowed(width).astype(np.float32)
+        return Seen(EnvironmentMap(radiance, self.environment.name), self.visible)
 
     def strata(self, level: float, count: int) -> Strata:
         return self.once((level, count), lambda: stratify_at(self.luminance, level, count))
@@ -69,22 +87,25 @@ def choose_strata(
     if not settings.shadowed_residual:
         return _truest(environment, settings)
     part = visible.key if visible else None
-    seen = environment.latest("seen", part, lambda: Seen.of(environment, visible))
+    seen = environment.latest("seen", part, lambda: Seen(environment, visible))
     if settings.lights is not None:
-        return _calmest(environment, seen, settings)
+        return _calmest(seen, settings)
     return seen.strata(seen.borders.best_level, settings.strata)
 
 
-def _calmest(environment: EnvironmentMap, seen: Seen, settings: ConversionSettings) -> Strata:
-    """From the border of least noise upwards, as long as noise and wrong shadows become less."""
-    found = seen.borders
+def _calmest(seen: Seen, settings: ConversionSettings) -> Strata:
+    """From the border of least noise upwards, as long as noise and wrong shadows become less.
+
+    Wrong shadows are compared on a map of WIDE pixels at most: the order of borders is the same.
+    """
+    found, rough = seen.borders, seen.rough
     best, least = seen.strata(found.best_level, settings.strata), np.inf
     for k in range(found.best, 0, -PER_OCTAVE):
-        strata = seen.strata(float(found.level[k]), settings.strata)
-        wrong = _error(environment, strata, settings) ** 2
+        level = float(found.level[k])
+        wrong = _error(rough.environment, rough.strata(level, settings.strata), settings) ** 2
         noise = squared_noise(found.variance[k])
         if wrong + noise < least:
-            best, least = strata, wrong + noise
+            best, least = seen.strata(level, settings.strata), wrong + noise
         if noise > least or wrong < noise / 10:
             break
     return best

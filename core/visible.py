@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from . import sphere
 from .environment import EnvironmentMap
 
-ROWS = 24
+ROWS = 18
 """Of cells, from pole to pole."""
 
-NEAR = np.radians(8)
+NEAR = np.radians(11)
 """A cell is visible that has its centre so near to a direction from which light was found to come:
 about a cell's diagonal."""
 
@@ -90,9 +90,7 @@ def _may_reach(
 ) -> NDArray[np.bool_]:
     """Cells far from where light was found to come from that are yet too bright to leave out: seen
     after all, or so bright that to find nothing proves nothing."""
-    lum = environment.luminance.ravel()
-    cell = _cells_of_pixels(environment.width, environment.height).ravel()
-    light = environment.once("light of cells", lambda: _light_of_cells(environment, cell))
+    light = environment.once("light of cells", lambda: _light_of_cells(environment))
     size = np.repeat(sphere.row_solid_angles(*_SIZE), 2 * ROWS)
     met = (light / size)[sphere.pixels_at(looks.escaped, *_SIZE)]
     reaching = 2 * np.pi * met.sum() / looks.count
@@ -102,18 +100,29 @@ def _may_reach(
     proven = trials <= looks.places
     proven &= np.cumsum(np.where(proven, trials, 0)) <= MOST_LOOKS
     for k in np.flatnonzero(proven):
-        pixels = np.flatnonzero(cell == bright[k])
-        brightest = pixels[[np.argmax(lum[pixels])]]
-        towards = sphere.pixel_centres(brightest, environment.width, environment.height)[0]
-        proven[k] = not looks.reaches(towards, int(trials[k]))
+        proven[k] = not looks.reaches(_brightest(environment, int(bright[k])), int(trials[k]))
     found = np.zeros(len(near), bool)
     found[bright[~proven]] = True
     return found
 
 
-def _light_of_cells(environment: EnvironmentMap, cell: NDArray[np.intp]) -> NDArray[np.float64]:
-    solid = sphere.row_solid_angles(environment.width, environment.height)
-    return np.bincount(cell, (environment.luminance * solid[:, None]).ravel(), 2 * ROWS * ROWS)
+def _light_of_cells(environment: EnvironmentMap) -> NDArray[np.float64]:
+    width, height = environment.width, environment.height
+    light = environment.luminance * sphere.row_solid_angles(width, height)[:, None]
+    cell = _cells_of_pixels(width, height)
+    return np.bincount(cell.ravel(), light.ravel(), 2 * ROWS * ROWS)
+
+
+def _brightest(environment: EnvironmentMap, cell: int) -> NDArray[np.float64]:
+    """The direction of the brightest pixel in a cell that has any, (3,)."""
+    width, height = environment.width, environment.height
+    row, column = divmod(cell, 2 * ROWS)
+    top, left = -(-row * height // ROWS), -(-column * width // (2 * ROWS))
+    bottom, right = -(-(row + 1) * height // ROWS), -(-(column + 1) * width // (2 * ROWS))
+    block = environment.luminance[top:bottom, left:right]
+    down, across = np.unravel_index(np.argmax(block), block.shape)
+    pixel = np.array([(top + down) * width + left + across])
+    return sphere.pixel_centres(pixel, width, height)[0]
 
 
 def _cells_of_pixels(width: int, height: int) -> NDArray[np.intp]:

@@ -166,16 +166,17 @@ def is_half_enough(radiance: NDArray[np.float32]) -> bool:
     return bool((np.abs(rounded - whole) <= HALF_ENERGY * whole).all())
 
 
-def write(path: Path, radiance: NDArray[np.float32]) -> None:
-    """Write a map as half floats where they are enough, else as float32; ZIP.
+def write(path: Path, radiance: NDArray[np.float32], compressed: bool = True) -> None:
+    """Write a map as half floats where they are enough, else as float32.
 
-    radiance: (height, width, 3), linear Rec.709. Raises CannotWrite.
+    radiance: (height, width, 3), linear Rec.709. compressed: by ZIP, which takes most of the time.
+    Raises CannotWrite.
     """
     import OpenEXR
 
     stored = radiance.astype(np.float16) if is_half_enough(radiance) else radiance
     header = {
-        "compression": OpenEXR.ZIP_COMPRESSION,
+        "compression": OpenEXR.ZIP_COMPRESSION if compressed else OpenEXR.NO_COMPRESSION,
         "type": OpenEXR.scanlineimage,
         "chromaticities": REC709,
     }

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
+from sunsplit.addon.rays import PLACES
 from sunsplit.addon.scene_needs import ALL, LIGHTING_WIDTH, SceneNeeds, needs_of
 from tests.blender import (
     add_mesh,
@@ -42,7 +43,7 @@ def sees_world(scene) -> bool:
 def test_in_a_box_nothing_is_needed(scene):
     needs = needs_of(scene)
     assert not any((needs.camera_sees_world, needs.mirrors, needs.other_lights))
-    assert len(needs.reach.places) > 1000
+    assert len(needs.reach.places) >= PLACES
     assert not needs.reach.escaped
 
 
@@ -201,20 +202,38 @@ def test_an_animated_material_may_become_anything(scene):
 @pytest.mark.parametrize(
     ("width", "lighting"),
     [
-        (512, None),
-        (1024, None),
+        (512, 512),
+        (1024, 1024),
         (2048, 1024),
         (8192, 1024),
         (16384, 1024),
         (3000, 1000),
-        (3026, None),  # a whole part of it would be 178 wide
-        (2 * 4099, None),
+        (3026, 3026),  # a whole part of it would be 178 wide
+        (2 * 4099, 2 * 4099),
     ],
 )
 def test_a_map_that_only_lights_is_a_whole_part_of_the_map(width, lighting):
     needs = SceneNeeds(camera_sees_world=True, mirrors=False, other_lights=False)
     assert needs.residual_width(width) == lighting
-    assert ALL.residual_width(width) is None
+    assert ALL.residual_width(width) == width
+
+
+@pytest.mark.parametrize(
+    ("width", "camera", "shown", "mirrored"),
+    [
+        (8192, 2048, 2048, 2048),
+        (8192, 2049, 4096, 4096),
+        (8192, 300, 512, 1024),
+        (8192, 9000, 8192, 8192),
+        (3000, 700, 750, 1500),
+        (2 * 4099, 700, 2 * 4099, 2 * 4099),
+    ],
+)
+def test_a_map_that_is_seen_is_as_wide_as_a_picture_can_show(width, camera, shown, mirrored):
+    needs = SceneNeeds(True, mirrors=True, other_lights=False, camera_width=camera)
+    assert needs.width_for_camera(width) == shown
+    assert needs.residual_width(width) == mirrored
+    assert ALL.width_for_camera(width) == width
 
 
 def test_a_wide_map_lights_with_a_narrower_one(scene, tmp_path):
