@@ -74,36 +74,38 @@ class Looks:
 
 
 def visible_part(environment: EnvironmentMap, looks: Looks) -> VisiblePart | None:
-    """What of a map is visible; None: all of it, or it cannot be told."""
+    """What of a map is visible; None: all of it, or it cannot be told.
+
+    Only what is bright and reaches nothing is left out: the rest does no harm, and the answer is
+    the same from wherever one looks a little further.
+    """
     if not len(looks.escaped):
         return None
     centres = sphere.pixel_centres(np.arange(2 * ROWS * ROWS), *_SIZE)
-    near = (centres @ looks.escaped.T).max(axis=1) > np.cos(NEAR)
-    if near.all():
+    far = (centres @ looks.escaped.T).max(axis=1) <= np.cos(NEAR)
+    hidden = _hidden(environment, np.flatnonzero(far), looks) if far.any() else []
+    if not len(hidden):
         return None
-    cells = near | _may_reach(environment, near, looks)
-    return None if cells.all() else VisiblePart(cells.reshape(ROWS, 2 * ROWS))
+    cells = np.ones(len(far), bool)
+    cells[hidden] = False
+    return VisiblePart(cells.reshape(ROWS, 2 * ROWS))
 
 
-def _may_reach(
-    environment: EnvironmentMap, near: NDArray[np.bool_], looks: Looks
-) -> NDArray[np.bool_]:
-    """Cells far from where light was found to come from that are yet too bright to leave out: seen
-    after all, or so bright that to find nothing proves nothing."""
+def _hidden(environment: EnvironmentMap, cells: NDArray[np.intp], looks: Looks) -> NDArray[np.intp]:
+    """Those of some cells, far from where light was found to come from, that are bright and proven
+    to reach nothing: not so bright that to find nothing proves nothing."""
     light = environment.once("light of cells", lambda: _light_of_cells(environment))
     size = np.repeat(sphere.row_solid_angles(*_SIZE), 2 * ROWS)
     met = (light / size)[sphere.pixels_at(looks.escaped, *_SIZE)]
     reaching = 2 * np.pi * met.sum() / looks.count
-    bright = np.flatnonzero(~near & (light > WORTH * reaching))
+    bright = cells[light[cells] > WORTH * reaching]
     bright = bright[np.argsort(-light[bright], kind="stable")]
     trials = np.ceil(RULE_OF_THREE * light[bright] / max(WORTH * reaching, 1e-300))
     proven = trials <= looks.places
     proven &= np.cumsum(np.where(proven, trials, 0)) <= MOST_LOOKS
     for k in np.flatnonzero(proven):
         proven[k] = not looks.reaches(_brightest(environment, int(bright[k])), int(trials[k]))
-    found = np.zeros(len(near), bool)
-    found[bright[~proven]] = True
-    return found
+    return bright[proven]
 
 
 def _light_of_cells(environment: EnvironmentMap) -> NDArray[np.float64]:
