@@ -16,11 +16,11 @@ from .passes import users_layers
 PICTURE = 48, 27
 """Rays through a camera's picture that look for the world."""
 
-PLACES = 500
-"""Where paths through the picture end that tell what is visible: three looks from each miss no
-more than a few degrees."""
+PLACES = 300
+"""Where paths through the picture end that tell what is visible: three looks from each meet most
+of it. What is bright and was not met is asked for by itself."""
 
-PATHS = 2000
+PATHS = 600
 """So many at most: some pictures show little but the world."""
 
 MOST_PLACES = 10_000

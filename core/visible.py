@@ -27,6 +27,9 @@ about a cell's diagonal."""
 WORTH = 0.01
 """As a part of the light that is known to reach something: more must not be overlooked at once."""
 
+FEWEST_TRIALS = 30
+"""Places that are asked whether a cell's light comes to them, however faint it is."""
+
 MOST_LOOKS = 10_000
 """To find out about cells that may be too bright to be overlooked; what takes more is visible."""
 
@@ -101,6 +104,7 @@ def _hidden(environment: EnvironmentMap, cells: NDArray[np.intp], looks: Looks) 
     bright = cells[light[cells] > WORTH * reaching]
     bright = bright[np.argsort(-light[bright], kind="stable")]
     trials = np.ceil(RULE_OF_THREE * light[bright] / max(WORTH * reaching, 1e-300))
+    trials = np.maximum(trials, FEWEST_TRIALS)
     proven = trials <= looks.places
     proven &= np.cumsum(np.where(proven, trials, 0)) <= MOST_LOOKS
     for k in np.flatnonzero(proven):
