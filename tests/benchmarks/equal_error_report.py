@@ -13,6 +13,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import LogLocator, NullFormatter
 
 if TYPE_CHECKING:
     from tests.benchmarks.equal_error import Curve
@@ -116,6 +117,10 @@ def _plot(rows: Sequence[Row], path: Path) -> None:
         axes.plot(row.seconds[[0, 2], 0], [place] * 2, color="#cccccc", zorder=0)
     axes.set_yticks(places, [f"{row.split.map}, {row.split.scene}" for row in rows])
     axes.set_xscale("log")
+    low, high = axes.get_xlim()
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 300 * low else (1,)))
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("seconds to an error of 5 %")
     figure.legend(loc="outside upper center", ncols=3, frameon=False)
     figure.savefig(path, dpi=110)
