@@ -188,8 +188,9 @@ CHOICES = {
     ),
     "skips": BoolProperty(
         name="Skip What Is Not Needed",
-        description="Leave out what this scene, as it is now, cannot show: an HDRI that the camera "
-        "does not see, details that nothing mirrors, Cycles' light tree",
+        description="Leave out what this scene, as it is now, cannot show: lamps for light that "
+        "reaches nothing the camera sees, an HDRI that it does not see or is wider than its "
+        "picture, details that nothing mirrors, Cycles' light tree",
         default=True,
         options=_FRESH,
     ),

@@ -9,16 +9,16 @@ from typing import Any
 import bpy
 
 from ..core.conversion import Conversion
-from ..core.environment import EnvironmentMap
 from ..core.errors import UnusableInput
 from ..core.passes import parts_of, samples_of_passes
 from ..core.sampling import needs_light_tree
 from ..core.settings import ConversionSettings
-from ..core.visible import VisiblePart, visible_part
+from ..core.visible import visible_part
 from . import passes
 from .known import known_conversion
 from .lamps import link_lamps, make_lamps, remove_lamps, unlink_lamps
 from .light_groups import put_into_groups, remove_groups
+from .rays import Reach
 from .scene_needs import ALL, SceneNeeds, needs_of
 from .trace import TAG
 from .world import (
@@ -117,7 +117,11 @@ def convert_scene(
     needs = found if options.skips else ALL
     environment = read_image(light.image)
     needed = _without_excess(settings, environment.width, needs)
-    conversion = known_conversion(environment, needed, _visible(environment, light, needs))
+    visible = None
+    # EEVEE's world shines through everything: there, what is left in it would do harm.
+    if needs.sight and needed.chooses_border and scene.render.engine == "CYCLES":
+        visible = visible_part(environment, Reach.of(needs.sight).looks(light.map_from_world))
+    conversion = known_conversion(environment, needed, visible)
     original = state.original_world if again else world
     tree_off = _is_without_light_tree(scene, conversion, needs)
     camera_width = needs.width_for_camera(environment.width)
@@ -150,15 +154,6 @@ def _without_excess(
     if settings.residual_width is not None or narrower == width:
         return settings
     return replace(settings, residual_width=narrower)
-
-
-def _visible(
-    environment: EnvironmentMap, light: WorldLight, needs: SceneNeeds
-) -> VisiblePart | None:
-    """What of the map reaches anything that the camera sees."""
-    if needs.reach is None:
-        return None
-    return visible_part(environment, needs.reach.looks(light.map_from_world))
 
 
 def _is_without_light_tree(

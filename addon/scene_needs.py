@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import bpy
 
 from ..core.environment import whole_part, whole_part_from
-from .rays import Reach, Sight, camera_width, is_all_met, stands_still
+from .rays import Sight, camera_width, is_all_met, stands_still
 
 SHARP = 0.25
 """Roughness below which a surface may show single pixels of a wide map."""
@@ -32,13 +32,13 @@ class SceneNeeds:
     """camera_sees_world: or a render may show it behind transparent things. mirrors: something
     reflects or refracts sharply. other_lights: something but the world and lamps of conversions
     gives light. camera_width: pixels around the sphere that a picture can tell apart; None: any.
-    reach: what light from the world reaches; None: anything."""
+    sight: the scene for rays that ask what light reaches; None: they would not tell."""
 
     camera_sees_world: bool
     mirrors: bool
     other_lights: bool
     camera_width: int | None = None
-    reach: Reach | None = field(default=None, compare=False)
+    sight: Sight | None = field(default=None, compare=False)
 
     def width_for_camera(self, width: int) -> int:
         """Of the map that the camera sees, for a map of this width."""
@@ -72,7 +72,7 @@ def needs_of(scene: bpy.types.Scene) -> SceneNeeds:
         other_lights=any(thing.type == "LIGHT" and thing not in own for thing in shown)
         or any(_shines(node) for node in nodes),
         camera_width=camera_width(scene),
-        reach=Reach.of(sight) if sight and _is_told_by_rays(scene, shown, nodes) else None,
+        sight=sight if sight and _is_told_by_rays(scene, shown, nodes) else None,
     )
 
 

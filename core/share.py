@@ -35,7 +35,8 @@ MOST_OF_A_WORLD = 0.95
 """Where the residual is a scene's world: mirrors must have something to show."""
 
 WIDE = 1024
-"""Pixels of a map's width with which borders are compared."""
+"""Pixels of a map's width with which borders are compared. Of four maps 4096 wide and 1 to 32 lights
+15 of 16 got the same border as with all pixels, one the next."""
 
 ROUGH = 4096
 """Patches with which shares are compared: their order is what counts."""
@@ -96,7 +97,7 @@ def choose_strata(
 def _calmest(seen: Seen, settings: ConversionSettings) -> Strata:
     """From the border of least noise upwards, as long as noise and wrong shadows become less.
 
-    Wrong shadows are compared on a map of WIDE pixels at most: the order of borders is the same.
+    Wrong shadows are compared on a map of WIDE pixels at most.
     """
     found, rough = seen.borders, seen.rough
     best, least = seen.strata(found.best_level, settings.strata), np.inf

@@ -22,13 +22,14 @@ ROWS = 18
 
 NEAR = np.radians(11)
 """A cell is visible that has its centre so near to a direction from which light was found to come:
-about a cell's diagonal."""
+about a cell's width."""
 
 WORTH = 0.01
 """As a part of the light that is known to reach something: more must not be overlooked at once."""
 
 FEWEST_TRIALS = 30
-"""Places that are asked whether a cell's light comes to them, however faint it is."""
+"""Places that are asked whether a cell's light comes to them, however faint it is: what a tenth of
+them can see is not overlooked."""
 
 MOST_LOOKS = 10_000
 """To find out about cells that may be too bright to be overlooked; what takes more is visible."""
@@ -55,10 +56,9 @@ class VisiblePart:
         """Which pixels of a map of this size are visible, (height, width)."""
         return self.cells.ravel()[_cells_of_pixels(width, height)]
 
-    def of(self, plane: NDArray[np.floating]) -> NDArray[np.floating]:
-        """A map, (height, width) or (height, width, 3), without what is not visible."""
-        mask = self.pixels(plane.shape[1], plane.shape[0])
-        return plane * mask.reshape(mask.shape + (1,) * (plane.ndim - 2)).astype(plane.dtype)
+    def of(self, lum: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A map of luminance, (height, width), without what is not visible."""
+        return lum * self.pixels(*lum.shape[::-1])
 
 
 @dataclass(frozen=True, eq=False)

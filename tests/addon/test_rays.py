@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from sunsplit.addon.rays import camera_width
+from sunsplit.addon.rays import Reach, camera_width
 from sunsplit.addon.scene_needs import needs_of
 from tests.blender import (
     add_mesh,
@@ -67,6 +67,12 @@ def test_a_sun_below_the_ground_is_no_lamp_and_stays_in_the_world(scene):
     bpy.ops.sunsplit.convert(skips=False)
     assert heights(scene) == pytest.approx([BELOW[2], ABOVE[2]], abs=1e-3)
     assert "reaches nothing" not in scene.sunsplit.report
+
+
+def test_eevee_whose_world_shines_through_the_ground_gets_both_lamps(scene):
+    scene.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
+    bpy.ops.sunsplit.convert()
+    assert heights(scene) == pytest.approx([BELOW[2], ABOVE[2]], abs=1e-3)
 
 
 def test_what_is_visible_turns_with_the_world(scene):
@@ -164,7 +170,7 @@ def test_through_a_window_only_what_is_in_front_of_it(two_suns):
 
 
 def test_the_same_scene_is_seen_the_same_way_twice(scene):
-    first, second = (needs_of(scene).reach for _ in range(2))
+    first, second = (Reach.of(needs_of(scene).sight) for _ in range(2))
     assert first.escaped == second.escaped
 
 

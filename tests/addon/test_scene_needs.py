@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from sunsplit.addon.rays import PLACES
+from sunsplit.addon.rays import PLACES, Reach
 from sunsplit.addon.scene_needs import ALL, LIGHTING_WIDTH, SceneNeeds, needs_of
 from tests.blender import (
     add_mesh,
@@ -43,8 +43,9 @@ def sees_world(scene) -> bool:
 def test_in_a_box_nothing_is_needed(scene):
     needs = needs_of(scene)
     assert not any((needs.camera_sees_world, needs.mirrors, needs.other_lights))
-    assert len(needs.reach.places) >= PLACES
-    assert not needs.reach.escaped
+    reach = Reach.of(needs.sight)
+    assert len(reach.places) >= PLACES
+    assert not reach.escaped
 
 
 def break_wall(scene):

@@ -22,6 +22,7 @@ import numpy as np
 from mathutils import Matrix
 
 from sunsplit.addon import known
+from sunsplit.addon.rays import Reach
 from sunsplit.addon.scene import SceneOptions, convert_scene, restore_scene
 from sunsplit.addon.scene_needs import needs_of
 from sunsplit.addon.world import WorldLight, find_light, read_image
@@ -54,10 +55,14 @@ def looks(path: Path, options: argparse.Namespace) -> list[Result]:
     ):
         scene = build(path, size)
         bpy.context.view_layer.update()
-        found.append(Result(f"look at {what}, first", seconds(lambda s=scene: needs_of(s))))
-        again = [seconds(lambda s=scene: needs_of(s)) for _ in range(options.repeats)]
+        found.append(Result(f"look at {what}, first", seconds(partial(_reach, scene))))
+        again = [seconds(partial(_reach, scene)) for _ in range(options.repeats)]
         found.append(Result(f"look at {what}, again", float(np.median(again))))
     return found
+
+
+def _reach(scene: bpy.types.Scene) -> Reach:
+    return Reach.of(needs_of(scene).sight)
 
 
 def _with_hills(path: Path, side: int) -> bpy.types.Scene:
@@ -114,7 +119,7 @@ def overhead(path: Path, options: argparse.Namespace) -> tuple[float, float]:
 
 def _look(scene: bpy.types.Scene, environment: EnvironmentMap, light: WorldLight) -> None:
     """All that is done to know what may be skipped."""
-    visible_part(environment, needs_of(scene).reach.looks(light.map_from_world))
+    visible_part(environment, _reach(scene).looks(light.map_from_world))
 
 
 def changes(path: Path, options: argparse.Namespace) -> list[Result]:
