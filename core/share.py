@@ -35,8 +35,8 @@ MOST_OF_A_WORLD = 0.95
 """Where the residual is a scene's world: mirrors must have something to show."""
 
 WIDE = 1024
-"""Pixels of a map's width with which borders are compared. Of four maps 4096 wide and 1 to 32 lights
-15 of 16 got the same border as with all pixels, one the next."""
+"""Pixels of a map's width with which borders are compared. Of four maps 4096 wide, each
+with 1 to 32 lights, 15 of 16 got the same border as with all pixels, one the next."""
 
 ROUGH = 4096
 """Patches with which shares are compared: their order is what counts."""
