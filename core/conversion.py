@@ -12,7 +12,7 @@ from .environment import LUMINANCE_WEIGHTS, EnvironmentMap
 from .placement.choice import choose_suns
 from .progress import Progress, silent
 from .region import light_of_map, light_of_region_a
-from .residual import narrowed_without, without
+from .residual import LevelledPixels, residual_of, without
 from .samples import MapOfSamples, map_of_samples
 from .settings import ConversionSettings
 from .share import choose_strata
@@ -27,11 +27,12 @@ class Conversion:
     """What became of a map.
 
     suns: brightest first. residual: float32 (height, width, 3) of the width that was asked for,
-    or None. samples: what a Voronoi residual was made of, else None. predicted_error: what
-    shadows of the suns are wrong by, as a part of the mean irradiance; see `prediction.Prediction`.
-    ground_error: what level ground in the open gets wrong of the worst channel, as a part of its
-    irradiance. visible: what suns were chosen from, where that is not the whole map. notes: plain
-    sentences for the user.
+    or None. levelled: the same with all pixels of a wide map, where these were asked for; then
+    `residual` is as narrow as what was looked at. samples: what a Voronoi residual was made of,
+    else None. predicted_error: what shadows of the suns are wrong by, as a part of the mean
+    irradiance; see `prediction.Prediction`. ground_error: what level ground in the open gets wrong
+    of the worst channel, as a part of its irradiance. visible: what suns were chosen from, where
+    that is not the whole map. notes: plain sentences for the user.
     """
 
     environment: EnvironmentMap
@@ -39,6 +40,7 @@ class Conversion:
     strata: Strata
     suns: tuple[Sun, ...]
     residual: NDArray[np.float32] | None
+    levelled: LevelledPixels | None
     samples: MapOfSamples | None
     account: Account
     predicted_error: float
@@ -87,13 +89,13 @@ def convert(
         unshadowed = None if shadowed else light_of_map(without(environment, light))
         chosen = choose_suns(light, strata, settings, unshadowed)
     progress("residual", 0.7)
-    residual, samples = None, None
+    residual, levelled, samples = None, None, None
     notes = (*_share_note(strata, settings), *notes, *chosen.notes)
     if settings.leaves_residual:
-        residual = narrowed_without(environment, light, settings.residual_width)
+        residual, levelled = residual_of(environment, light, settings.residual_width)
         if settings.residual == "voronoi":
             samples, more = map_of_samples(residual, settings)
-            residual, notes = samples.radiance, notes + more
+            residual, levelled, notes = samples.radiance, None, notes + more
     progress("account", 0.9)
     account = settle(environment, chosen.suns, residual)
     progress("done", 1.0)
@@ -103,6 +105,7 @@ def convert(
         strata,
         chosen.suns,
         residual,
+        levelled,
         samples,
         account,
         chosen.predicted_error,

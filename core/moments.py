@@ -78,7 +78,7 @@ class Moments:
         for part, directions in self._blocks():
             owner = self.owner[part]
             own = ((directions - self.to_light[owner]) ** 2).sum(axis=1) / 2
-            own += sphere.pixel_spread(self.light.pixels[part], self.light.width, self.light.height)
+            own += self.light.spread(part)
             apart += np.bincount(owner, self.light.luminous_flux[part] * own, self.count)
         lit = self.luminous_flux > 0
         return np.divide(apart, self.luminous_flux, out=np.zeros(self.count), where=lit)
@@ -87,5 +87,4 @@ class Moments:
         """Parts of the pixels with their directions."""
         for start in range(0, len(self.light.pixels), AT_ONCE):
             part = slice(start, start + AT_ONCE)
-            pixels = self.light.pixels[part]
-            yield part, sphere.pixel_directions(pixels, self.light.width, self.light.height)
+            yield part, self.light.directions(part)

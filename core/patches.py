@@ -84,18 +84,13 @@ def _joined(parts: list[Patches]) -> Patches:
 
 
 def _pixels(light: RegionLight, brightness: Floats) -> Patches:
-    """Each pixel as a patch, or as four where it holds much of the light."""
+    """Each pixel as a patch, or as four if it holds much of the light and nothing tells where."""
+    if light.given is not None:
+        return Patches(light.directions(), light.flux, light.spread(), brightness)
     size = light.width, light.height
     four = light.luminous_flux > IN_FOUR * light.luminous_flux.sum()
     single, several = light.part(~four), light.part(four)
-    found = [
-        Patches(
-            sphere.pixel_directions(single.pixels, *size),
-            single.flux,
-            sphere.pixel_spread(single.pixels, *size),
-            brightness[~four],
-        )
-    ]
+    found = [Patches(single.directions(), single.flux, single.spread(), brightness[~four])]
     finer = 2 * light.width, 2 * light.height
     rows, columns = np.divmod(several.pixels, light.width)
     solid, fine = sphere.row_solid_angles(*size)[rows], sphere.row_solid_angles(*finer)
@@ -135,8 +130,7 @@ def _blocks(
     length = np.linalg.norm(vector, axis=1)
     # Pixels spread too, each as wide as those in the block's middle row.
     middle = np.minimum((rows << k) + (1 << (k - 1)), light.height - 1)
-    own = sphere.pixel_spread(middle * light.width, light.width, light.height)
-    spread = np.maximum(1 - length / luminous, 0) + own
+    spread = np.maximum(1 - length / luminous, 0) + light.own_spread(middle)
     return Patches(vector / length[:, None], sums[:, :3], spread, peaks)
 
 
@@ -150,16 +144,8 @@ def _pyramid(light: RegionLight, brightness: Floats) -> tuple[list[Floats], list
     wide = -(-light.width // LARGEST_BLOCK) * LARGEST_BLOCK // 2
     rows, columns = np.divmod(light.pixels, light.width)
     block = (rows >> 1) * wide + (columns >> 1)
-    azimuth, polar = sphere.centroid_angles(light.width, light.height)
-    ring = (np.sin(polar)[rows]) * light.luminous_flux
     finest = np.empty((tall * wide, _SUMS))
-    values = (
-        *light.flux.T,
-        light.luminous_flux,
-        ring * np.cos(azimuth)[columns],
-        ring * np.sin(azimuth)[columns],
-        light.luminous_flux * np.cos(polar)[rows],
-    )
+    values = (*light.flux.T, light.luminous_flux, *_vectors(light, rows, columns))
     for number, value in enumerate(values):
         finest[:, number] = np.bincount(block, value, tall * wide)
     peak = np.zeros(tall * wide)
@@ -172,3 +158,15 @@ def _pyramid(light: RegionLight, brightness: Floats) -> tuple[list[Floats], list
         pairs = np.maximum(below[::2], below[1::2])
         peaks.append(np.maximum(pairs[:, ::2], pairs[:, 1::2]))
     return sums, peaks
+
+
+def _vectors(
+    light: RegionLight, rows: NDArray[np.intp], columns: NDArray[np.intp]
+) -> tuple[Floats, ...]:
+    """Luminous flux times mean direction of each pixel: x, y and z, (p,) each."""
+    if light.given is not None:
+        return tuple(light.luminous_flux * axis for axis in light.given.T)
+    azimuth, polar = sphere.centroid_angles(light.width, light.height)
+    ring = np.sin(polar)[rows] * light.luminous_flux
+    up = light.luminous_flux * np.cos(polar)[rows]
+    return ring * np.cos(azimuth)[columns], ring * np.sin(azimuth)[columns], up

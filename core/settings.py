@@ -13,6 +13,7 @@ Position = Literal["centroid", "sample"]
 Frequency = Literal["one", "energy", "mean"]
 """F of the paper: 1; the integral of L over the sample's cell; that by the cell's area."""
 ResidualKind = Literal["map", "voronoi", "none"]
+ResidualWidth = int | Literal["own"] | None
 Fill = Literal["surroundings", "black"]
 Target = Literal["cycles", "eevee", "export"]
 
@@ -60,7 +61,8 @@ class ConversionSettings:
     frequency: what weighs samples that are clustered (paper, section 3): "one", the "energy" of
         their cells or its "mean" over the cell.
     residual: "map", a "voronoi" map of samples (paper, 2.3), or "none": leave the rest out.
-    residual_width: pixels, a whole part of the map's width, or None for the map's own.
+    residual_width: pixels, a whole part of the map's width, "own" for all of them, or None: as
+        many as light needs, about 1,024; mirrors and backgrounds may show that it is not sharp.
     residual_samples: how many samples a Voronoi map is made of.
     fill: what the residual shows in region A: its "surroundings", with only what exceeds them
         given to suns, or "black" (the paper's), with all light given to them. None: surroundings
@@ -79,7 +81,7 @@ class ConversionSettings:
     position: Position = "centroid"
     frequency: Frequency = "energy"
     residual: ResidualKind = "map"
-    residual_width: int | None = None
+    residual_width: ResidualWidth = None
     residual_samples: int = 500
     fill: Fill | None = None
 
@@ -94,7 +96,7 @@ class ConversionSettings:
             raise BadSetting(f"share must be 0 to 1, not {self.share:g}.")
         if self.strata < 2 or self.strata % 2:
             raise BadSetting(f"strata must be an even number from 2 up, not {self.strata}.")
-        if self.residual_width is not None and self.residual_width < 2:
+        if self.residual_width not in (None, "own") and int(self.residual_width) < 2:
             raise BadSetting(f"residual_width must be at least 2, not {self.residual_width}.")
         for name, choice in _CHOICES.items():
             if (value := getattr(self, name)) not in choice:

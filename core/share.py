@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
-from .environment import EnvironmentMap, whole_part
+from .environment import EnvironmentMap
 from .memo import Memo
 from .noise import PER_OCTAVE, Borders, borders, squared_noise
 from .patches import patches_of
@@ -33,10 +33,6 @@ flat; once it has risen twice, it goes on rising."""
 
 MOST_OF_A_WORLD = 0.95
 """Where the residual is a scene's world: mirrors must have something to show."""
-
-WIDE = 1024
-"""Pixels of a map's width with which borders are compared. Of four maps 4096 wide, each
-with 1 to 32 lights, 15 of 16 got the same border as with all pixels, one the next."""
 
 ROUGH = 4096
 """Patches with which shares are compared: their order is what counts."""
@@ -62,15 +58,6 @@ class Seen(Memo):
         """That the map could be cut at."""
         return borders(self.luminance, sphere.row_solid_angles(*self.luminance.shape[::-1]))
 
-    @cached_property
-    def rough(self) -> Seen:
-        """The same of a map that is at most WIDE."""
-        width = whole_part(self.environment.width, WIDE)
-        if width == self.environment.width:
-            return self
-        radiance = self.environment.narrowed(width).astype(np.float32)
-        return Seen(EnvironmentMap(radiance, self.environment.name), self.visible)
-
     def strata(self, level: float, count: int) -> Strata:
         return self.once((level, count), lambda: stratify_at(self.luminance, level, count))
 
@@ -95,15 +82,12 @@ def choose_strata(
 
 
 def _calmest(seen: Seen, settings: ConversionSettings) -> Strata:
-    """From the border of least noise upwards, as long as noise and wrong shadows become less.
-
-    Wrong shadows are compared on a map of WIDE pixels at most.
-    """
-    found, rough = seen.borders, seen.rough
+    """From the border of least noise upwards, as long as noise and wrong shadows become less."""
+    found = seen.borders
     best, least = seen.strata(found.best_level, settings.strata), np.inf
     for k in range(found.best, 0, -PER_OCTAVE):
         level = float(found.level[k])
-        wrong = _error(rough.environment, rough.strata(level, settings.strata), settings) ** 2
+        wrong = _error(seen.environment, seen.strata(level, settings.strata), settings) ** 2
         noise = squared_noise(found.variance[k])
         if wrong + noise < least:
             best, least = seen.strata(level, settings.strata), wrong + noise

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..environment import scalar_irradiance
+from ..environment import WIDE, scalar_irradiance
 from ..errors import CannotWrite, UnusableInput
 from ..tolerances import HALF_ENERGY, HALF_MAXIMUM
 from .exr_layers import Channel, Layer, choose_layer
-from .limits import MAXIMUM_PIXELS, refuse_absurd_size, too_large_for_memory
+from .limits import MAXIMUM_PIXELS, damaged_exr, refuse_absurd_size, too_large_for_memory
 from .quiet import quiet_libraries
+from .strips import ExrPixels
 
 MAGIC = b"\x76\x2f\x31\x01"
 
@@ -38,6 +39,32 @@ def read(path: Path) -> tuple[NDArray[np.floating], list[str]]:
     return pixels, [*warnings, *_colour_warnings(header), *remarks]
 
 
+def open_map(path: Path) -> tuple[NDArray[np.floating] | ExrPixels, list[str]]:
+    """The same, or of a wide map pixels that are read a few rows at a time where its file allows.
+    Raises UnusableInput.
+    """
+    headers = _read_headers(path)
+    layer, warnings = choose_layer(headers, path.name)
+    header = headers[layer.part]
+    _check_map(header, path.name)
+    pixels = _strips(path, layer, header) if len(headers) == 1 else None
+    if pixels is None:
+        return read(path)
+    return pixels, [*warnings, *_colour_warnings(header)]
+
+
+def _strips(path: Path, layer: Layer, header: Header) -> ExrPixels | None:
+    """Pixels that lie where the picture does."""
+    window = _window(header, "dataWindow")
+    cropped = "envmap" not in header and not np.array_equal(
+        window, _window(header, "displayWindow")
+    )
+    size = _size(window)
+    if size[0] <= WIDE or cropped:
+        return None
+    return ExrPixels.of(path, layer.channels, size, int(window[0][1]))
+
+
 def _read_headers(path: Path) -> list[Header]:
     """Before the pixels: OpenEXR reads them all, and says nothing of those that it cannot read."""
     import OpenEXR
@@ -52,19 +79,15 @@ def _read_headers(path: Path) -> list[Header]:
             # decodes names when they are asked for, and damaged ones are no text.
             headers = [_plain(part.header) for part in file.parts]
     except (RuntimeError, ValueError, TypeError, KeyError, MemoryError, OSError) as error:
-        raise _damaged(path) from error
+        raise damaged_exr(path.name) from error
     if not headers:
-        raise _damaged(path)
+        raise damaged_exr(path.name)
     return headers
 
 
 def _plain(header: Header) -> Header:
     channels = [Channel(c.name, max(c.xSampling, c.ySampling) > 1) for c in header["channels"]]
     return header | {"channels": channels}
-
-
-def _damaged(path: Path) -> UnusableInput:
-    return UnusableInput(f"{path.name} is truncated or damaged: OpenEXR cannot read it.")
 
 
 def _check_map(header: Header, name: str) -> None:
@@ -98,13 +121,13 @@ def _read_planes(path: Path, layer: Layer, header: Header) -> list[NDArray]:
     except MemoryError as error:
         raise too_large_for_memory(path.name, *size) from error
     except (RuntimeError, ValueError, TypeError, OSError) as error:
-        raise _damaged(path) from error
+        raise damaged_exr(path.name) from error
     # OpenEXR leaves out what it could not read and says why in passing.
     if "MemoryError" in remarks.getvalue():
         raise too_large_for_memory(path.name, *size)
     planes = [found.get(name) for name in layer.channels]
     if any(plane is None or plane.shape != (size[1], size[0]) for plane in planes):
-        raise _damaged(path)
+        raise damaged_exr(path.name)
     return planes
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,6 +36,32 @@ def read(path: Path, allow_ldr: bool, upright: bool = True) -> NDArray[np.float3
         pixels = _upright(pixels, spec.getattribute("Orientation") or 1)
     colour = pixels[..., [0, 0, 0]] if spec.nchannels < 3 else pixels[..., :3]
     return np.ascontiguousarray(colour if linear else _from_srgb(colour))
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[ImageInput]:
+    """A file of linear light for `read_rows`. Raises UnusableInput."""
+    with quiet_libraries():
+        source = _open(path)
+    try:
+        _check(source, path.name, allow_ldr=False)
+        yield source
+    finally:
+        source.close()
+
+
+def read_rows(source: ImageInput, name: str, top: int, bottom: int) -> NDArray[np.float32]:
+    """Red, green and blue of some rows, (bottom - top, width, 3). Raises UnusableInput."""
+    import OpenImageIO as oiio
+
+    spec = source.spec()
+    try:
+        with quiet_libraries():
+            pixels = source.read_scanlines(top, bottom, 0, 0, 3, oiio.FLOAT)
+    except MemoryError as error:
+        raise too_large_for_memory(name, spec.width, spec.height) from error
+    _raise_if_damaged(pixels, source, name)
+    return pixels
 
 
 def _open(path: Path) -> ImageInput:
@@ -80,11 +108,15 @@ def _read_pixels(source: ImageInput, name: str) -> NDArray[np.float32]:
         pixels = source.read_image(oiio.FLOAT)
     except MemoryError as error:
         raise too_large_for_memory(name, spec.width, spec.height) from error
+    _raise_if_damaged(pixels, source, name)
+    return pixels
+
+
+def _raise_if_damaged(pixels: NDArray[np.float32] | None, source: ImageInput, name: str) -> None:
     problem = source.geterror()
     if pixels is None or problem:
         reason = (problem.splitlines() or ["its pixels end too early"])[0].strip()
         raise UnusableInput(f"{name} is truncated or damaged ({reason}).")
-    return pixels
 
 
 def _upright(pixels: NDArray[np.float32], orientation: int) -> NDArray[np.float32]:

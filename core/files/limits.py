@@ -19,3 +19,8 @@ def refuse_absurd_size(name: str, width: int, height: int) -> None:
 def too_large_for_memory(name: str, width: int, height: int) -> UnusableInput:
     """The error for a size that may be honest, but not on this machine."""
     return UnusableInput(f"{name}, {width} x {height} pixels, does not fit into memory.")
+
+
+def damaged_exr(name: str) -> UnusableInput:
+    """The error for what OpenEXR stumbles over."""
+    return UnusableInput(f"{name} is truncated or damaged: OpenEXR cannot read it.")

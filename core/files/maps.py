@@ -4,29 +4,45 @@ from __future__ import annotations
 
 import hashlib
 import stat
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
-from ..environment import EnvironmentMap, environment_from_pixels
+import numpy as np
+from numpy.typing import NDArray
+
+from ..environment import EnvironmentMap, environment_from_pixels, environment_from_strips
 from ..errors import UnusableInput
+from ..pixels import Pixels
+from ..progress import Progress, silent
 from . import exr, image, radiance
 
 
-def load(path: str | Path, allow_ldr: bool = False) -> EnvironmentMap:
+def load(path: str | Path, allow_ldr: bool = False, progress: Progress = silent) -> EnvironmentMap:
     """Read, check and repair a map. Raises UnusableInput with one clear sentence."""
     path = Path(path)
-    magic, sha256 = _identify(path)
-    warnings: list[str] = []
+    magic = _first_bytes(path)
+    with ThreadPoolExecutor(1) as pool:
+        digest = pool.submit(_sha256, path)
+        pixels, warnings = _open(path, magic, allow_ldr)
+        if isinstance(pixels, np.ndarray):
+            environment = environment_from_pixels(pixels, path.stem, path.name)
+        else:
+            environment = environment_from_strips(pixels, path.stem, path.name, progress=progress)
+        return replace(environment, sha256=digest.result(), warnings=tuple(warnings))
+
+
+def _open(
+    path: Path, magic: bytes, allow_ldr: bool
+) -> tuple[NDArray[np.floating] | Pixels, list[str]]:
     if magic == exr.MAGIC:
-        pixels, warnings = exr.read(path)
-    elif magic.startswith(radiance.MAGIC):
-        pixels = radiance.read(path)
-    else:
-        pixels = image.read(path, allow_ldr)
-    return environment_from_pixels(pixels, path.stem, path.name, sha256, tuple(warnings))
+        return exr.open_map(path)
+    if magic.startswith(radiance.MAGIC):
+        return radiance.read(path), []
+    return image.read(path, allow_ldr), []
 
 
-def _identify(path: Path) -> tuple[bytes, str]:
-    """The file's first four bytes and the SHA-256 of all of them."""
+def _first_bytes(path: Path) -> bytes:
     try:
         mode = path.stat().st_mode
         if stat.S_ISDIR(mode):
@@ -35,13 +51,23 @@ def _identify(path: Path) -> tuple[bytes, str]:
             raise UnusableInput(f"{path} is a pipe or a device: give a file.")
         with path.open("rb") as file:
             magic = file.read(4)
-            file.seek(0)
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
     except FileNotFoundError:
         raise UnusableInput(f"{path} does not exist.") from None
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise UnusableInput(f"{path} cannot be read: {reason}.") from error
+        raise _unreadable(path, error) from error
     if not magic:
         raise UnusableInput(f"{path} is empty.")
-    return magic, digest
+    return magic
+
+
+def _sha256(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise _unreadable(path, error) from error
+
+
+def _unreadable(path: Path, error: Exception) -> UnusableInput:
+    reason = getattr(error, "strerror", None) or str(error)
+    return UnusableInput(f"{path} cannot be read: {reason}.")

@@ -13,9 +13,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..environment import WIDE
 from ..errors import UnusableInput
 from . import image
 from .limits import refuse_absurd_size
+from .strips import HdrPixels
 
 MAGIC = b"#?"
 
@@ -42,6 +44,10 @@ class _Header:
     start: int
 
     @property
+    def is_upright(self) -> bool:
+        return not (self.by_columns or self.upwards or self.leftwards)
+
+    @property
     def width(self) -> int:
         return self.scanlines if self.by_columns else self.length
 
@@ -50,8 +56,9 @@ class _Header:
         return self.length if self.by_columns else self.scanlines
 
 
-def read(path: Path) -> NDArray[np.float32]:
-    """Pixels (height, width, 3), linear, upright. Raises UnusableInput.
+def read(path: Path) -> NDArray[np.float32] | HdrPixels:
+    """Pixels (height, width, 3), linear, upright, or a wide map's a few rows at a time. Raises
+    UnusableInput.
 
     EXPOSURE, PRIMARIES and the like are left alone, as Blender does: many programs write nonsense
     there, and a constant factor changes no split.
@@ -63,6 +70,8 @@ def read(path: Path) -> NDArray[np.float32]:
     if path.stat().st_size - header.start < _least_bytes(header):
         raise _truncated(path.name)
     if _has_new_runs(head[header.start : header.start + 4], header.length):
+        if header.is_upright and header.width > WIDE:
+            return HdrPixels(path, header.width, header.height)
         stored = image.read(path, allow_ldr=False, upright=False)
     else:
         stored = _from_rgbe(_read_old(path, header))
