@@ -172,7 +172,8 @@ CHOICES = {
     ),
     "residual_width": IntProperty(
         name="Residual Width",
-        description="Pixels of the residual map's width, a whole part of the map's; 0: as wide",
+        description="Pixels of the residual map's width, a whole part of the map's; 0: as many as "
+        "lights and mirrors of the scene need",
         default=0,
         options=_FRESH,
         min=0,

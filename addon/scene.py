@@ -116,7 +116,7 @@ def convert_scene(
     found = needs_of(scene) if options.skips or options.two_passes else ALL
     needs = found if options.skips else ALL
     environment = read_image(light.image)
-    needed = _without_excess(settings, environment.width, needs)
+    needed = _without_excess(settings, environment.own_width, needs)
     visible = None
     # EEVEE's world shines through everything: there, what is left in it would do harm.
     if needs.sight and needed.chooses_border and scene.render.engine == "CYCLES":
@@ -124,7 +124,7 @@ def convert_scene(
     conversion = known_conversion(environment, needed, visible)
     original = state.original_world if again else world
     tree_off = _is_without_light_tree(scene, conversion, needs)
-    camera_width = needs.width_for_camera(environment.width)
+    camera_width = needs.width_for_camera(environment.own_width)
     sentences = [
         *_sentences(conversion),
         *_skipped(conversion, settings, needs, tree_off),
@@ -149,11 +149,11 @@ def convert_scene(
 def _without_excess(
     settings: ConversionSettings, width: int, needs: SceneNeeds
 ) -> ConversionSettings:
-    """With a narrower residual where nothing could tell it from one as wide as the map."""
-    narrower = needs.residual_width(width)
-    if settings.residual_width is not None or narrower == width:
+    """With a residual so wide that nothing could tell it from one as wide as the map."""
+    if settings.residual_width is not None:
         return settings
-    return replace(settings, residual_width=narrower)
+    narrower = needs.residual_width(width)
+    return replace(settings, residual_width="own" if narrower == width else narrower)
 
 
 def _is_without_light_tree(
@@ -189,13 +189,13 @@ def _skipped(
 ) -> list[str]:
     """What was left out, and why."""
     lines = []
-    own, width = conversion.environment.width, conversion.settings.residual_width
+    own, width = conversion.environment.own_width, conversion.settings.residual_width
     if conversion.invisible_part > LEAST_SAID:
         lines.append(
             f"Skipped: {conversion.invisible_part:.1%} of the light reaches nothing that the "
             "camera shows: no lamps for it, it stays in the world."
         )
-    if conversion.residual is not None and width != settings.residual_width:
+    if conversion.residual is not None and width not in (settings.residual_width, "own"):
         why = "the camera is too coarse for more" if needs.mirrors else "nothing mirrors sharply"
         lines.append(
             f"Skipped: {why}, so the world that lights is {width} pixels wide instead of {own}."

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..core.conversion import Conversion
 from ..core.environment import EnvironmentMap, environment_from_pixels
 from ..core.errors import CannotWrite, UnusableInput
+from ..core.residual import LevelledPixels
 from ..core.sampling import WorldSampling, choose_sampling
 from .known import known_map
 from .light_groups import take_out_of_groups
@@ -106,7 +107,7 @@ def _environment(image: bpy.types.Image, pixels: NDArray[np.float32]) -> Environ
     return environment_from_pixels(colour, Path(image.name).stem, image.name)
 
 
-def packed_image(radiance: NDArray[np.float32], kind: str) -> bpy.types.Image:
+def packed_image(radiance: NDArray[np.float32] | LevelledPixels, kind: str) -> bpy.types.Image:
     """A map as an image that travels inside the .blend file. Raises CannotWrite.
 
     kind: what it is; with the map's name it becomes the image's, see `name_images`.
@@ -116,8 +117,10 @@ def packed_image(radiance: NDArray[np.float32], kind: str) -> bpy.types.Image:
     try:
         with tempfile.TemporaryDirectory(prefix="sunsplit-") as folder:
             path = Path(folder) / "map.exr"
-            # Small maps are written often, and as fast as may be.
-            exr.write(path, radiance, compressed=radiance.shape[1] > UNCOMPRESSED)
+            if isinstance(radiance, LevelledPixels):
+                exr.write_strips(path, radiance, exr.is_half_enough(radiance.residual))
+            else:  # small maps are written often, and as fast as may be
+                exr.write(path, radiance, compressed=radiance.shape[1] > UNCOMPRESSED)
             image = bpy.data.images.load(str(path))
             # Our own writer and Blender's packing keep the values; Image.save() would encode them.
             image.pack()
@@ -162,7 +165,8 @@ def converted_world(
             group.node_tree[TAG] = True
             tree = group.node_tree
         _strip(tree)
-        texture, residual = tree.nodes[light.texture.node.name], conversion.residual
+        texture = tree.nodes[light.texture.node.name]
+        residual = conversion.levelled or conversion.residual
         image = packed_image(residual, "residual") if residual is not None else None
         # Between cells nothing is to be blended: a Voronoi map has edges.
         closest = conversion.settings.residual == "voronoi"
@@ -170,10 +174,8 @@ def converted_world(
         mix = _insert(tree, texture, image, interpolation, -300)
         if camera_sees_it:
             _show_camera(mix)
-        if camera_sees_it and camera_width not in (None, conversion.environment.width):
-            narrow = packed_image(
-                conversion.environment.narrowed(camera_width).astype(np.float32), "camera"
-            )
+        if camera_sees_it and camera_width not in (None, conversion.environment.own_width):
+            narrow = packed_image(conversion.environment.narrowed(camera_width), "camera")
             _insert(tree, texture, narrow, texture.interpolation, 300)
         _set_sampling(new, _sampling(conversion, closest))
     except BaseException:  # whatever it is, it goes on; only the half-made copy goes away

@@ -170,8 +170,7 @@ def run_convert(options: argparse.Namespace) -> int:
 
     settings = settings_from(options)
     with terminal_progress() as progress:
-        progress("reading", 0.0)
-        environment = load(options.map, options.allow_ldr)
+        environment = load(options.map, options.allow_ldr, _within(progress, 0.0, 0.3))
         conversion = convert(environment, settings, _within(progress, 0.3, 0.8))
         progress("writing", 0.8)
         files = save(conversion, options.output, options.preview)
@@ -193,8 +192,7 @@ def run_info(options: argparse.Namespace) -> int:
     from .settings import ConversionSettings
 
     with terminal_progress() as progress:
-        progress("reading", 0.0)
-        environment = load(options.map, options.allow_ldr)
+        environment = load(options.map, options.allow_ldr, _within(progress, 0.0, 0.3))
         conversion = convert(
             environment, ConversionSettings(residual="none"), _within(progress, 0.3, 1.0)
         )
@@ -208,8 +206,7 @@ def run_figures(options: argparse.Namespace) -> int:
 
     settings = figure_settings_from(options)
     with terminal_progress() as progress:
-        progress("reading", 0.0)
-        environment = load(options.map, options.allow_ldr)
+        environment = load(options.map, options.allow_ldr, _within(progress, 0.0, 0.1))
         pictures = draw_figures(environment, settings, _within(progress, 0.1, 0.9))
         progress("writing", 0.9)
         paths = save_figures(pictures, environment.name, options.output)

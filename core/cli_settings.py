@@ -14,6 +14,7 @@ from .settings import (
     Method,
     Position,
     ResidualKind,
+    ResidualWidth,
     Shape,
     Target,
 )
@@ -183,9 +184,10 @@ def _add_rest(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         "--residual-width",
-        type=_count,
+        type=_residual_width,
         metavar="PIXELS",
-        help="a whole part of the map's width (default: the map's own)",
+        help='a whole part of the map\'s width, or "own" for all of it, which mirrors and '
+        "backgrounds show (default: as many as light needs, about 1024)",
     )
     group.add_argument(
         "--residual-samples",
@@ -199,6 +201,14 @@ def _add_rest(group: argparse._ArgumentGroup) -> None:
 def _count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number from 1 up")
+    return int(text)
+
+
+def _residual_width(text: str) -> ResidualWidth:
+    if text == "own":
+        return "own"
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither own nor a number from 1 up")
     return int(text)
 
 

@@ -77,9 +77,8 @@ def narrowed(pixels: Pixels, width: int) -> NDArray[np.float32]:
     step = pixels.width // width
     solid = sphere.row_solid_angles(pixels.width, pixels.height)
     out = np.empty((width // 2, width, 3), np.float32)
-    rows = int(np.lcm(step, pixels.least_rows))
     top = 0
-    for strip in pixels.strips(rows * max(round(ROWS / rows), 1)):
+    for strip in pixels.strips(rows_of(pixels, step)):
         planes = planes_of(strip)
         weight = solid[top * step :][: planes.shape[1]].reshape(-1, step)
         light = _light_of_blocks(planes, weight)
@@ -87,6 +86,18 @@ def narrowed(pixels: Pixels, width: int) -> NDArray[np.float32]:
         out[top : top + len(weight)] = np.moveaxis(means, 0, -1)
         top += len(weight)
     return out
+
+
+def rows_of(pixels: Pixels, step: int = 1) -> int:
+    """To read at a time: a multiple of `step`."""
+    least = int(np.lcm(step, pixels.least_rows))
+    return least * max(round(ROWS / least), 1)
+
+
+def total_light(strip: tuple[NDArray[np.floating], ...], solid: Floats) -> Floats:
+    """Scalar irradiance that some rows give, (3,). solid: angle of a pixel of each row."""
+    rows = np.stack([plane.sum(axis=1, dtype=np.float64) for plane in strip])
+    return rows @ solid
 
 
 def _light_of_blocks(planes: Planes, weight: Floats) -> Floats:

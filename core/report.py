@@ -35,7 +35,7 @@ def conversion_lines(conversion: Conversion, files: WrittenFiles) -> list[str]:
 
 
 def _map_lines(environment: EnvironmentMap) -> list[str]:
-    lines = [f"{environment.file}: {environment.width} x {environment.height}"]
+    lines = [f"{environment.file}: {environment.own_width} x {environment.own_height}"]
     if environment.repairs.pixels:
         added = environment.repaired_share
         lines.append(f"repaired pixels: {environment.repairs} (light changed by {added:.3%})")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,6 @@ import numpy as np
 
 from ..account import Account
 from ..conversion import Conversion
-from ..environment import scalar_irradiance
 from ..errors import UnusableInput
 from . import exr, lights_json, samples_json
 from .atomic import written_together
@@ -44,9 +43,14 @@ def save(conversion: Conversion, folder: str | Path, preview: bool = False) -> W
         names["preview"] = f"{stem}.preview.png"
     with written_together(folder, list(names.values())) as drafts:
         draft = dict(zip(names, drafts, strict=True))
-        lights_json.write(draft["lights"], describe(conversion))
-        if conversion.residual is not None:
+        account = conversion.account
+        if conversion.levelled is not None:
+            half = exr.is_half_enough(conversion.residual)
+            written = exr.write_strips(draft["residual"], conversion.levelled, half)
+            account = replace(account, residual=written)
+        elif conversion.residual is not None:
             exr.write(draft["residual"], conversion.residual)
+        lights_json.write(draft["lights"], describe(conversion) | _stated(account))
         if conversion.samples is not None:
             samples_json.write(draft["samples"], conversion.samples, names["residual"])
         if preview:
@@ -61,6 +65,8 @@ def describe(conversion: Conversion) -> dict[str, Any]:
     residual = None
     if conversion.residual is not None:
         height, width = conversion.residual.shape[:2]
+        if conversion.levelled:
+            height, width = conversion.levelled.height, conversion.levelled.width
         name = f"{environment.name}.residual.exr"
         kind = conversion.settings.residual
         residual = {"file": name, "kind": kind, "width": width, "height": height}
@@ -78,21 +84,25 @@ def describe(conversion: Conversion) -> dict[str, Any]:
     return {
         "source": {
             "file": environment.file,
-            "width": environment.width,
-            "height": environment.height,
+            "width": environment.own_width,
+            "height": environment.own_height,
             "sha256": environment.sha256,
             "repaired_pixels": environment.repairs.pixels,
         },
         "settings": settings,
         "suns": [lights_json.sun_as_dict(sun) for sun in conversion.suns],
         "residual": residual,
-        "account": lights_json.account_as_dict(account),
+        **_stated(account),
         "predicted_error": {
             "shadow_edges_percent": 100 * conversion.predicted_error,
             "level_ground_percent": 100 * conversion.ground_error,
         },
         "notes": [*environment.warnings, *conversion.notes],
     }
+
+
+def _stated(account: Account) -> dict[str, Any]:
+    return {"account": lights_json.account_as_dict(account)}
 
 
 def account_of_files(lights: str | Path) -> Account:
@@ -104,6 +114,6 @@ def account_of_files(lights: str | Path) -> Account:
         file = lights.parent / document["residual"]["file"]
         if not file.exists():
             raise UnusableInput(f"{file} is missing: convert the map again.")
-        residual = scalar_irradiance(exr.read(file)[0].astype(np.float32))
+        residual = exr.light_of(file)
     given = np.sum([sun.scalar_irradiance for sun in suns], axis=0) if suns else np.zeros(3)
     return Account(stated.source, given, residual)

@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..environment import WIDE, scalar_irradiance
-from ..errors import CannotWrite, UnusableInput
+from .. import sphere
+from ..environment import scalar_irradiance, working_width
+from ..errors import UnusableInput
+from ..pixels import Pixels
+from ..reduction import narrowed, rows_of, total_light
 from ..tolerances import HALF_ENERGY, HALF_MAXIMUM
+from . import image
 from .exr_layers import Channel, Layer, choose_layer
-from .limits import MAXIMUM_PIXELS, damaged_exr, refuse_absurd_size, too_large_for_memory
+from .limits import (
+    MAXIMUM_PIXELS,
+    cannot_write,
+    damaged_exr,
+    refuse_absurd_size,
+    too_large_for_memory,
+)
 from .quiet import quiet_libraries
 from .strips import ExrPixels
 
@@ -60,7 +71,7 @@ def _strips(path: Path, layer: Layer, header: Header) -> ExrPixels | None:
         window, _window(header, "displayWindow")
     )
     size = _size(window)
-    if size[0] <= WIDE or cropped:
+    if working_width(size[0]) == size[0] or cropped:
         return None
     return ExrPixels.of(path, layer.channels, size, int(window[0][1]))
 
@@ -212,7 +223,37 @@ def write(path: Path, radiance: NDArray[np.float32], compressed: bool = True) ->
         ):
             file.write(stream)
     except (OSError, RuntimeError) as error:
-        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
-        raise CannotWrite(
-            f"Cannot write into {path.parent}: {reason}. Nothing was changed."
-        ) from error
+        raise cannot_write(path.parent, error) from error
+
+
+def write_strips(path: Path, pixels: Pixels, half: bool) -> NDArray[np.float64]:
+    """Write a map a few rows at a time, as half floats if these hold it: its scalar irradiance, of
+    each channel, (3,), before it was rounded. Raises CannotWrite."""
+    if find_spec("OpenImageIO") is None:  # there is no wheel for Windows on ARM
+        whole = narrowed(pixels, pixels.width)
+        write(path, whole)
+        return scalar_irradiance(whole)
+    solid = sphere.row_solid_angles(pixels.width, pixels.height)
+    total, top = np.zeros(3), 0
+    with image.created(path, pixels.width, half, REC709) as file:
+        for strip in pixels.strips(rows_of(pixels)):
+            if half and max(plane.max() for plane in strip) > HALF_MAXIMUM:
+                break
+            image.write_rows(file, path, top, np.stack(strip, axis=-1))
+            bottom = top + len(strip[0])
+            total += total_light(strip, solid[top:bottom])
+            top = bottom
+    return total if top == pixels.height else write_strips(path, pixels, half=False)
+
+
+def light_of(path: Path) -> NDArray[np.float64]:
+    """Scalar irradiance of a map, of each channel, (3,). Raises UnusableInput."""
+    pixels = open_map(path)[0]
+    if isinstance(pixels, np.ndarray):
+        return scalar_irradiance(pixels.astype(np.float32))
+    solid = sphere.row_solid_angles(pixels.width, pixels.height)
+    total, top = np.zeros(3), 0
+    for strip in pixels.strips(rows_of(pixels)):
+        total += total_light(strip, solid[top : top + len(strip[0])])
+        top += len(strip[0])
+    return total

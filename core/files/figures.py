@@ -112,7 +112,7 @@ class _Looks:
         # A file's name may hold bytes that are no text, and those cannot be drawn.
         name = environment.name.encode(errors="replace").decode()
         name = name if len(name) <= 60 else f"{name[:59]}…"
-        self.name = f"{name}, {environment.width} x {environment.height}"
+        self.name = f"{name}, {environment.own_width} x {environment.own_height}"
         self.middle = middle_of(luminance(environment.radiance))
         self.pixels = tone_mapped(environment.radiance, self.middle)
         self.map = averaged(self.pixels)

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UnusableInput
-from .limits import refuse_absurd_size, too_large_for_memory
+from ..errors import CannotWrite, UnusableInput
+from .limits import cannot_write, refuse_absurd_size, too_large_for_memory
 from .quiet import quiet_libraries
 
 if TYPE_CHECKING:
-    from OpenImageIO import ImageInput
+    from OpenImageIO import ImageInput, ImageOutput
 
 
 def read(path: Path, allow_ldr: bool, upright: bool = True) -> NDArray[np.float32]:
@@ -62,6 +62,44 @@ def read_rows(source: ImageInput, name: str, top: int, bottom: int) -> NDArray[n
         raise too_large_for_memory(name, spec.width, spec.height) from error
     _raise_if_damaged(pixels, source, name)
     return pixels
+
+
+@contextmanager
+def created(
+    path: Path, width: int, half: bool, primaries: tuple[float, ...]
+) -> Iterator[ImageOutput]:
+    """An .exr file of a map, ZIP, for `write_rows`. Raises CannotWrite."""
+    import OpenImageIO as oiio
+
+    spec = oiio.ImageSpec(width, width // 2, 3, "half" if half else "float")
+    spec["compression"] = "zip"
+    spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), primaries)
+    try:
+        with quiet_libraries():
+            file = oiio.ImageOutput.create(str(path))
+            _raise_if_unwritten(file is not None and file.open(str(path), spec), file, path)
+    except TypeError as error:
+        raise CannotWrite(f"The name of {path.parent} is not Unicode: rename it.") from error
+    try:
+        yield file
+    finally:
+        with quiet_libraries():
+            file.close()
+
+
+def write_rows(file: ImageOutput, path: Path, top: int, pixels: NDArray[np.float32]) -> None:
+    """Rows that begin with this one, (rows, width, 3). Raises CannotWrite."""
+    with quiet_libraries():
+        done = file.write_scanlines(top, top + len(pixels), 0, pixels)
+    _raise_if_unwritten(done, file, path)
+
+
+def _raise_if_unwritten(done: bool, file: ImageOutput | None, path: Path) -> None:
+    import OpenImageIO as oiio
+
+    if not done:
+        reason = file.geterror() if file else oiio.geterror()
+        raise cannot_write(path.parent, OSError(reason or "no space is left"))
 
 
 def _open(path: Path) -> ImageInput:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ..errors import UnusableInput
+from pathlib import Path
+
+from ..errors import CannotWrite, UnusableInput
 
 MAXIMUM_PIXELS = 2**31
 """65,536 x 32,768, twice as wide as the largest maps that are sold."""
@@ -24,3 +26,9 @@ def too_large_for_memory(name: str, width: int, height: int) -> UnusableInput:
 def damaged_exr(name: str) -> UnusableInput:
     """The error for what OpenEXR stumbles over."""
     return UnusableInput(f"{name} is truncated or damaged: OpenEXR cannot read it.")
+
+
+def cannot_write(folder: Path, error: Exception) -> CannotWrite:
+    """The error for a folder that takes no file."""
+    reason = getattr(error, "strerror", None) or " ".join(str(error).split())
+    return CannotWrite(f"Cannot write into {folder}: {reason}. Nothing was changed.")

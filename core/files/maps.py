@@ -20,6 +20,7 @@ from . import exr, image, radiance
 
 def load(path: str | Path, allow_ldr: bool = False, progress: Progress = silent) -> EnvironmentMap:
     """Read, check and repair a map. Raises UnusableInput with one clear sentence."""
+    progress("reading", 0.0)
     path = Path(path)
     magic = _first_bytes(path)
     with ThreadPoolExecutor(1) as pool:

@@ -120,7 +120,7 @@ def _legend(conversion: Conversion) -> list[tuple[tuple[int, int, int], str]]:
     name = environment.name.encode(errors="replace").decode()
     all_light = account.source @ LUMINANCE_WEIGHTS
     lines = [
-        (INK, f"{name}   {environment.width} x {environment.height}"),
+        (INK, f"{name}   {environment.own_width} x {environment.own_height}"),
         (REGION, f"Outline: region A, {conversion.strata.share:.1%} of all light"),
         (SUN, f"Circles: {_suns(conversion)}, {account.share:.1%} of all light, true size"),
     ]

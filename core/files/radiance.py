@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..environment import WIDE
+from ..environment import working_width
 from ..errors import UnusableInput
 from . import image
 from .limits import refuse_absurd_size
@@ -70,7 +70,7 @@ def read(path: Path) -> NDArray[np.float32] | HdrPixels:
     if path.stat().st_size - header.start < _least_bytes(header):
         raise _truncated(path.name)
     if _has_new_runs(head[header.start : header.start + 4], header.length):
-        if header.is_upright and header.width > WIDE:
+        if header.is_upright and working_width(header.width) < header.width:
             return HdrPixels(path, header.width, header.height)
         stored = image.read(path, allow_ldr=False, upright=False)
     else:

@@ -20,8 +20,10 @@ import numpy as np
 
 from sunsplit.core import ConversionSettings, EnvironmentMap, convert, load, sphere
 from sunsplit.core.conversion import Conversion
-from sunsplit.core.environment import LUMINANCE_WEIGHTS, narrowed
+from sunsplit.core.environment import LUMINANCE_WEIGHTS
 from sunsplit.core.patches import patches_of
+from sunsplit.core.pixels import ArrayPixels
+from sunsplit.core.reduction import narrowed
 from sunsplit.core.region import light_of_map
 from sunsplit.core.sampling import choose_sampling
 from tests.benchmarks.occluders import Occluders, draw_occluders, light_of, light_of_suns
@@ -119,7 +121,7 @@ def _noise(occluders: Occluders, radiance: np.ndarray, to_table: float) -> np.nd
     """Variance of a ray of the surface's own, by the cosine, and, for a part of the samples, one by
     a table of the residual's light; both weighted by the balance heuristic."""
     width = min(COARSE, radiance.shape[1])
-    bright = (narrowed(radiance, width) @ LUMINANCE_WEIGHTS).reshape(-1, 1)
+    bright = (narrowed(ArrayPixels(radiance), width) @ LUMINANCE_WEIGHTS).reshape(-1, 1)
     directions = sphere.pixel_directions(np.arange(len(bright)), width, width // 2)
     flux = bright * np.repeat(sphere.row_solid_angles(width, width // 2), width)[:, None]
     by_table = to_table * bright / flux.sum()
