@@ -13,11 +13,8 @@ from .errors import UnusableInput
 from .memo import Memo
 from .pixels import ArrayPixels, Pixels
 from .progress import Progress, silent
-from .reduction import Reduction, narrowed, reduced
+from .reduction import LUMINANCE_WEIGHTS, Reduction, narrowed, reduced
 from .repairs import Repairs, repair
-
-LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
-"""Rec.709 luminance of linear RGB (ITU-R BT.709)."""
 
 WIDE = 1024
 """Pixels of a map's width from which it is looked at narrowed: a third of a degree each, which is

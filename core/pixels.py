@@ -9,8 +9,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+Strip = tuple[NDArray[np.floating], ...]
+"""Some rows of a map: red, green and blue, (rows, width) each, of the type that they come in."""
+
 Planes = NDArray[np.float32]
-"""Some rows of a map: red, green and blue, (3, rows, width)."""
+"""The same, (3, rows, width)."""
 
 
 class Pixels(Protocol):
@@ -27,7 +30,7 @@ class Pixels(Protocol):
         """Strips must have a multiple of so many."""
         ...
 
-    def strips(self, rows: int) -> Iterator[tuple[NDArray[np.floating], ...]]:
+    def strips(self, rows: int) -> Iterator[Strip]:
         """From the top, so many rows at a time (fewer at the end): red, green and blue,
         (rows, width) each, half or float32."""
         ...
@@ -51,36 +54,47 @@ class ArrayPixels:
     def least_rows(self) -> int:
         return 1
 
-    def strips(self, rows: int) -> Iterator[tuple[NDArray[np.floating], ...]]:
+    def strips(self, rows: int) -> Iterator[Strip]:
         for top in range(0, self.height, rows):
             yield tuple(np.moveaxis(self.radiance[top : top + rows], -1, 0))
 
 
-_VALUES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
-"""Of all half floats: looked up they are had in half the time of casting."""
-
-
-def as_float32(plane: NDArray[np.floating], out: NDArray[np.float32]) -> None:
-    """Copy numbers of any type into an array of the same shape."""
+def copy_as_float64(plane: NDArray[np.floating], out: NDArray[np.float64]) -> None:
+    """Copy numbers of any type, halfs only if finite and not negative, into an array of that
+    shape."""
     if plane.dtype == np.float16:
-        np.take(_VALUES, plane.view(np.uint16), out=out, mode="clip")
+        out[...] = _as_single(plane)
     else:
         out[...] = plane
 
 
-def planes_of(strip: tuple[NDArray[np.floating], ...]) -> Planes:
+def planes_of(strip: Strip) -> Planes:
     """A copy of some rows."""
     planes = np.empty((3, *strip[0].shape), np.float32)
     for plane, out in zip(strip, planes, strict=True):
-        as_float32(plane, out)
+        halfs = plane.dtype == np.float16 and highest_light(plane) >= 0
+        out[...] = _as_single(plane) if halfs else plane
     return planes
+
+
+HALF_IN_SINGLE = np.float32(2.0**112)
+"""The bits of a half float mean so much less in the place of those of a float32."""
+
+
+def _as_single(plane: NDArray[np.float16]) -> NDArray[np.float32]:
+    """Halfs, finite and not negative, with their bits moved to where a float32 has them: several
+    times faster than casting, and as exact."""
+    bits = plane.view(np.uint16).astype(np.uint32)
+    np.left_shift(bits, 13, out=bits)
+    singles = bits.view(np.float32)
+    return np.multiply(singles, HALF_IN_SINGLE, out=singles)
 
 
 def highest_light(plane: NDArray[np.floating]) -> float:
     """The largest number; nan unless all are finite and not below 0 (or -0)."""
     if plane.dtype == np.float16:  # as integers they are in the same order, and compared faster
         highest = int(plane.view(np.uint16).max())
-        return float(_VALUES[highest]) if highest < 0x7C00 else np.nan
+        return float(np.uint16(highest).view(np.float16)) if highest < 0x7C00 else np.nan
     if plane.dtype == np.float32:
         bits = plane.view(np.uint32).max()
         return float(bits.view(np.float32)) if bits < 0x7F800000 else np.nan

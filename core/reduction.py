@@ -12,23 +12,25 @@ from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from threading import local
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
-from .pixels import Pixels, Planes, as_float32, highest_light, planes_of
+from .pixels import Pixels, Strip, copy_as_float64, highest_light, planes_of
 from .progress import Progress, silent
 from .repairs import RepairedPixels, Repairs, highest_finite, repair_planes, repaired_strips
 
 Floats = NDArray[np.float64]
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
-"""Rec.709, for the mean of directions."""
+LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
+"""Rec.709 luminance of linear RGB (ITU-R BT.709)."""
 
 ROWS = 256
 """Read at a time, about: DWAB, the coarsest compression of OpenEXR, packs so many together."""
+
+NUMBERS = 1 << 16
+"""That are copied and summed at a time, about."""
 
 NONE = Repairs()
 
@@ -66,7 +68,7 @@ def reduced(raw: Pixels, width: int, progress: Progress = silent) -> Reduction:
         top = 0
         for planes, found in repaired_strips(raw, sums.rows, highest):
             if top in left_out:
-                sums.add_light(top, planes)
+                sums.add_light(top, tuple(planes))
                 repairs += found
             top += planes.shape[1]
     return sums.reduction(RepairedPixels(raw, highest, repairs.pixels > 0), repairs)
@@ -77,14 +79,15 @@ def narrowed(pixels: Pixels, width: int) -> NDArray[np.float32]:
     step = pixels.width // width
     solid = sphere.row_solid_angles(pixels.width, pixels.height)
     out = np.empty((width // 2, width, 3), np.float32)
+    alike = np.ones((step, 1))
     top = 0
     for strip in pixels.strips(rows_of(pixels, step)):
-        planes = planes_of(strip)
-        weight = solid[top * step :][: planes.shape[1]].reshape(-1, step)
-        light = _light_of_blocks(planes, weight)
-        means = light / (weight.sum(axis=1)[:, None] * step)
-        out[top : top + len(weight)] = np.moveaxis(means, 0, -1)
-        top += len(weight)
+        for first, sums in _sums_of_columns(strip, alike, step):
+            weight = solid[top + first :][: sums.shape[1]].reshape(-1, step)
+            light = np.einsum("cbrw,br->bwc", sums.reshape(3, *weight.shape, width), weight)
+            row = (top + first) // step
+            out[row : row + len(weight)] = light / (weight.sum(axis=1) * step)[:, None, None]
+        top += len(strip[0])
     return out
 
 
@@ -94,21 +97,30 @@ def rows_of(pixels: Pixels, step: int = 1) -> int:
     return least * max(round(ROWS / least), 1)
 
 
-def total_light(strip: tuple[NDArray[np.floating], ...], solid: Floats) -> Floats:
+def total_light(strip: Strip, solid: Floats) -> Floats:
     """Scalar irradiance that some rows give, (3,). solid: angle of a pixel of each row."""
     rows = np.stack([plane.sum(axis=1, dtype=np.float64) for plane in strip])
     return rows @ solid
 
 
-def _light_of_blocks(planes: Planes, weight: Floats) -> Floats:
-    """Sums over blocks of rows, (3, rows, width), times the weight of each row, (rows of blocks,
-    rows in each): (3, rows of blocks, columns of blocks).
+def _sums_of_columns(strip: Strip, weights: Floats, step: int) -> Iterator[tuple[int, Floats]]:
+    """Of a few rows at a time, over each `step` columns: the first row, and (3, rows, width / step,
+    k), the same array each time.
 
-    By einsum: in float64 without a copy, and the same whatever the number of threads.
+    weights: of each of those columns, (step, k). In float64, and so few rows at a time that they
+    stay near the processor, and that no library divides a product among threads: the same sums
+    whatever their number.
     """
-    step = weight.shape[1]
-    columns = np.einsum("cbrw,br->cbw", planes.reshape(3, *weight.shape, -1), weight)
-    return columns.reshape(*columns.shape[:2], -1, step).sum(axis=-1)
+    rows, width = strip[0].shape
+    most = step * max(NUMBERS // (step * width), 1)
+    out = np.empty((3, most, width // step, weights.shape[1]))
+    some = np.empty((most, width))
+    for top in range(0, rows, most):
+        count = min(most, rows - top)
+        for plane, sums in zip(strip, out, strict=True):
+            copy_as_float64(plane[top : top + count], some[:count])
+            np.matmul(some[:count].reshape(count, -1, step), weights, out=sums[:count])
+        yield top, out[:, :count]
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,64 +170,49 @@ class _BlockSums:
         # Rows that are added at a time: those of whole blocks.
         self.rows = step * max(PIXELS // width // step, 1)
         _, polar = sphere.centroid_angles(width, height)
-        of_pixel = np.stack([np.ones_like(polar), np.sin(polar), np.cos(polar)])
-        self._row_weights = sphere.row_solid_angles(width, height) * of_pixel
+        self.solid = sphere.row_solid_angles(width, height)
+        self._ring, self._up = self.solid * np.sin(polar), self.solid * np.cos(polar)
         turn = (np.arange(step) + 0.5 - step / 2) * (2 * np.pi / width)
-        self._across = np.stack([np.cos(turn), -np.sin(turn)])
-        self._own = local()
+        # Of each column of a block: itself, along the direction of the middle and across it.
+        self._columns = np.stack([np.ones(step), np.cos(turn), -np.sin(turn)], axis=-1)
 
-    def add(self, top: int, strip: tuple[NDArray[np.floating], ...]) -> _Found:
+    def add(self, top: int, strip: Strip) -> _Found:
         """Add rows that begin with this one, unless they hold what is no light."""
-        planes = self._buffer("planes", (3, *strip[0].shape))
-        for plane, out in zip(strip, planes, strict=True):
-            as_float32(plane, out)
         highest = np.array([highest_light(plane) for plane in strip], np.float32)
-        repairs = Repairs()
-        if np.isnan(highest).any():
-            highest = highest_finite(planes)
-            # Of halfs none is higher than what an infinite one becomes.
-            halfs = all(plane.dtype == np.float16 for plane in strip)
-            if np.isnan(planes).any() or not (halfs or np.isfinite(planes).all()):
-                return _Found(highest, left_out=True)
-            solid = self._row_weights[0, top : top + planes.shape[1]]
-            repairs = repair_planes(planes, highest, solid)
-        self.add_light(top, planes)
+        if not np.isnan(highest).any():
+            self.add_light(top, strip)
+            return _Found(highest)
+        planes = planes_of(strip)
+        highest = highest_finite(planes)
+        # Of halfs none is higher than what an infinite one becomes.
+        halfs = all(plane.dtype == np.float16 for plane in strip)
+        if np.isnan(planes).any() or not (halfs or np.isfinite(planes).all()):
+            return _Found(highest, left_out=True)
+        repairs = repair_planes(planes, highest, self.solid[top : top + planes.shape[1]])
+        self.add_light(top, tuple(planes))
         return _Found(highest, repairs)
 
-    def add_light(self, top: int, planes: Planes) -> None:
-        """Add rows, (3, rows, width), that are all light."""
-        rows = planes.shape[1]
-        shape = rows // self.step, self.step
-        weights = self._row_weights[:, top : top + rows].reshape(3, *shape)
-        into = slice(top // self.step, (top + rows) // self.step)
-        self.light[:, into] = _light_of_blocks(planes, weights[0])
-        luminance = self._luminance(planes).reshape(*shape, self.width)
-        level, aside, up = np.einsum("brw,kbr->kbw", luminance, weights)
-        self.luminous[into] = self._by_blocks(level).sum(axis=-1)
-        self.vector[:2, into] = np.einsum("bws,ks->kbw", self._by_blocks(aside), self._across)
-        self.vector[2, into] = self._by_blocks(up).sum(axis=-1)
+    def add_light(self, top: int, strip: Strip) -> None:
+        """Add rows that are all light."""
+        light, luminous, vector = self.light, self.luminous, self.vector
+        for first, sums in _sums_of_columns(strip, self._columns, self.step):
+            rows = slice(top + first, top + first + sums.shape[1])
+            into = slice(rows.start // self.step, rows.stop // self.step)
+            light[:, into] = self._sums_of_rows(sums[..., 0], self.solid[rows])
+            level, along, across = np.moveaxis(np.tensordot(LUMINANCE_WEIGHTS, sums, 1), -1, 0)
+            luminous[into] = self._sums_of_rows(level, self.solid[rows])
+            vector[0, into] = self._sums_of_rows(along, self._ring[rows])
+            vector[1, into] = self._sums_of_rows(across, self._ring[rows])
+            vector[2, into] = self._sums_of_rows(level, self._up[rows])
 
-    def _by_blocks(self, columns: Floats) -> Floats:
-        return columns.reshape(*columns.shape[:-1], -1, self.step)
-
-    def _luminance(self, planes: Planes) -> NDArray[np.float32]:
-        total, one = (self._buffer(name, planes.shape[1:]) for name in ("luminance", "one"))
-        np.multiply(planes[0], LUMINANCE[0], out=total)
-        for channel in (1, 2):
-            np.multiply(planes[channel], LUMINANCE[channel], out=one)
-            np.add(total, one, out=total)
-        return total
-
-    def _buffer(self, name: str, shape: tuple[int, ...]) -> NDArray[np.float32]:
-        """Of each thread its own: new memory for every part would take as long as the sums."""
-        kept = self._own.__dict__
-        if name not in kept or kept[name].shape != shape:
-            kept[name] = np.empty(shape, np.float32)
-        return kept[name]
+    def _sums_of_rows(self, values: Floats, weight: Floats) -> Floats:
+        """Over the rows of each block, (..., rows, w), by the weight of each row, (rows,)."""
+        in_blocks = values.reshape(*values.shape[:-2], -1, self.step, values.shape[-1])
+        return np.einsum("...brw,br->...bw", in_blocks, weight.reshape(-1, self.step))
 
     def reduction(self, pixels: RepairedPixels, repairs: Repairs) -> Reduction:
         """What all rows came to."""
-        solid = self._row_weights[0].reshape(-1, self.step).sum(axis=1) * self.step
+        solid = self.solid.reshape(-1, self.step).sum(axis=1) * self.step
         azimuth, _ = sphere.centroid_angles(self.width // self.step, self.height // self.step)
         cos, sin = np.cos(azimuth), np.sin(azimuth)
         along, across, up = self.vector / np.where(self.luminous > 0, self.luminous, 1)

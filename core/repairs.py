@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
-from .pixels import Pixels, Planes, planes_of
+from .pixels import Pixels, Planes, Strip, planes_of
 from .tolerances import HALF_MAXIMUM
 
 
@@ -132,7 +132,7 @@ class RepairedPixels:
     def least_rows(self) -> int:
         return self.raw.least_rows
 
-    def strips(self, rows: int) -> Iterator[tuple[NDArray[np.floating], ...]]:
+    def strips(self, rows: int) -> Iterator[Strip]:
         """See `Pixels`."""
         if not self.damaged:
             yield from self.raw.strips(rows)

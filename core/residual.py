@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from . import sphere
 from .environment import EnvironmentMap, check_part
-from .pixels import ArrayPixels, Planes, planes_of
+from .pixels import ArrayPixels, Planes, Strip, planes_of
 from .reduction import narrowed
 from .region import RegionLight
 from .settings import ResidualWidth
@@ -75,7 +75,7 @@ class LevelledPixels:
         """See `Pixels`."""
         return self.height // len(self.residual)
 
-    def strips(self, rows: int) -> Iterator[tuple[NDArray[np.floating], ...]]:
+    def strips(self, rows: int) -> Iterator[Strip]:
         """See `Pixels`."""
         solid = sphere.row_solid_angles(self.width, self.height)
         top, step = 0, self.least_rows

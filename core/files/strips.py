@@ -10,16 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..pixels import Strip
 from . import image
 from .limits import damaged_exr, too_large_for_memory
 from .quiet import quiet_libraries
 
 if TYPE_CHECKING:
     from OpenEXR import InputFile
-
-Strip = tuple[NDArray[np.floating], ...]
 
 UNREADABLE = (RuntimeError, ValueError, TypeError, KeyError, OSError)
 """What OpenEXR raises for files that it cannot read."""

@@ -21,7 +21,7 @@ from sunsplit.core.environment import (
     working_width,
 )
 from sunsplit.core.errors import UnusableInput
-from sunsplit.core.pixels import ArrayPixels
+from sunsplit.core.pixels import ArrayPixels, copy_as_float64, highest_light, planes_of
 from sunsplit.core.reduction import narrowed, reduced
 from sunsplit.core.repairs import repair
 from sunsplit.core.residual import levels_of
@@ -205,6 +205,24 @@ def test_a_level_leaves_the_mean_that_is_asked_for(values, part):
     level = levels_of(values, weight, np.array([wanted]))
     left = np.minimum(values, level[:, None]).astype(np.float64)
     assert (left @ weight)[0] / weight.sum() == pytest.approx(wanted, rel=1e-5, abs=1e-30)
+
+
+def test_every_half_float_is_copied_exactly():
+    halfs = np.arange(0x7C00, dtype=np.uint16).view(np.float16).reshape(1, -1)
+    doubles = np.empty(halfs.shape)
+    copy_as_float64(halfs, doubles)
+    assert (doubles == halfs).all()
+    assert (planes_of((halfs, halfs, halfs)) == halfs).all()
+    assert highest_light(halfs) == 65504
+
+
+@pytest.mark.parametrize("kind", [np.float16, np.float32, np.float64])
+@pytest.mark.parametrize("bad", [np.nan, -1e-7, np.inf, -np.inf])
+def test_what_is_no_light_is_noticed(kind, bad):
+    plane = np.ones((4, 8), kind)
+    assert highest_light(plane) == 1
+    plane[2, 3] = bad
+    assert np.isnan(highest_light(plane))
 
 
 def test_pixels_by_rows_make_the_same_map_as_pixels_in_memory(wide):
