@@ -118,7 +118,8 @@ def packed_image(radiance: NDArray[np.float32] | LevelledPixels, kind: str) -> b
         with tempfile.TemporaryDirectory(prefix="sunsplit-") as folder:
             path = Path(folder) / "map.exr"
             if isinstance(radiance, LevelledPixels):
-                exr.write_strips(path, radiance, exr.is_half_enough(radiance.residual))
+                half = exr.halved(radiance.residual) is not None
+                exr.write_strips(path, radiance, half)
             else:  # small maps are written often, and as fast as may be
                 exr.write(path, radiance, compressed=radiance.shape[1] > UNCOMPRESSED)
             image = bpy.data.images.load(str(path))

@@ -45,7 +45,7 @@ def save(conversion: Conversion, folder: str | Path, preview: bool = False) -> W
         draft = dict(zip(names, drafts, strict=True))
         account = conversion.account
         if conversion.levelled is not None:
-            half = exr.is_half_enough(conversion.residual)
+            half = exr.halved(conversion.residual) is not None
             written = exr.write_strips(draft["residual"], conversion.levelled, half)
             account = replace(account, residual=written)
         elif conversion.residual is not None:

@@ -68,11 +68,11 @@ def read_rows(source: ImageInput, name: str, top: int, bottom: int) -> NDArray[n
 def created(
     path: Path, width: int, half: bool, primaries: tuple[float, ...]
 ) -> Iterator[ImageOutput]:
-    """An .exr file of a map, ZIP, for `write_rows`. Raises CannotWrite."""
+    """An .exr file of a map for `write_rows`. Raises CannotWrite."""
     import OpenImageIO as oiio
 
     spec = oiio.ImageSpec(width, width // 2, 3, "half" if half else "float")
-    spec["compression"] = "zip"
+    spec["compression"] = "piz" if half else "zip"
     spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), primaries)
     try:
         with quiet_libraries():
