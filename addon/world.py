@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.conversion import Conversion
-from ..core.environment import EnvironmentMap, environment_from_pixels
+from ..core.environment import EnvironmentMap, environment_from_strips
 from ..core.errors import CannotWrite, UnusableInput
+from ..core.pixels import HeldPixels
 from ..core.residual import LevelledPixels
 from ..core.sampling import WorldSampling, choose_sampling
 from .known import known_map
@@ -104,7 +105,7 @@ def _environment(image: bpy.types.Image, pixels: NDArray[np.float32]) -> Environ
     width, height = image.size
     pixels = pixels.reshape(height, width, image.channels)[::-1]
     colour = pixels[..., :3] if image.channels >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
-    return environment_from_pixels(colour, Path(image.name).stem, image.name)
+    return environment_from_strips(HeldPixels.of(colour), Path(image.name).stem, image.name)
 
 
 def packed_image(radiance: NDArray[np.float32] | LevelledPixels, kind: str) -> bpy.types.Image:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from . import sphere
 from .errors import UnusableInput
 from .memo import Memo
-from .pixels import ArrayPixels, Pixels
+from .pixels import HeldPixels, Pixels, whole
 from .progress import Progress, silent
 from .reduction import LUMINANCE_WEIGHTS, Reduction, narrowed, reduced
 from .repairs import Repairs, repair
@@ -64,7 +64,7 @@ class EnvironmentMap(Memo):
     def _narrowed(self, width: int) -> NDArray[np.float32]:
         check_part(width, self.own_width)
         if self.width % width == 0:
-            return narrowed(ArrayPixels(self.radiance), width)
+            return narrowed(HeldPixels.of(self.radiance), width)
         return narrowed(self.pixels, width)
 
     @cached_property
@@ -77,7 +77,7 @@ class EnvironmentMap(Memo):
     @property
     def pixels(self) -> Pixels:
         """All pixels of the map, not narrowed."""
-        return self.reduction.pixels if self.reduction else ArrayPixels(self.radiance)
+        return self.reduction.pixels if self.reduction else HeldPixels.of(self.radiance)
 
     @property
     def own_width(self) -> int:
@@ -97,47 +97,32 @@ class EnvironmentMap(Memo):
         return self.radiance.shape[1]
 
 
-def environment_from_pixels(
-    pixels: NDArray[np.floating],
-    name: str,
-    file: str = "",
-    sha256: str = "",
-    warnings: tuple[str, ...] = (),
-) -> EnvironmentMap:
+def environment_from_pixels(pixels: NDArray[np.floating], name: str) -> EnvironmentMap:
     """Check and repair pixels (height, width, 3), linear Rec.709, into an `EnvironmentMap`.
 
     Raises UnusableInput when the map is not 2:1 or holds no light.
     """
     if pixels.ndim != 3 or pixels.shape[2] != 3:
         raise ValueError(f"expected pixels of shape (height, width, 3), got {pixels.shape}")
-    _check_shape(pixels.shape[1], pixels.shape[0], name)
-    radiance, repairs = repair(pixels)
-    width, reduction = working_width(radiance.shape[1]), None
-    if width < radiance.shape[1]:
-        reduction = reduced(ArrayPixels(radiance), width)
-        radiance = reduction.radiance
-    environment = EnvironmentMap(radiance, name, file, sha256, repairs, warnings, reduction)
-    return _not_black(environment)
+    return environment_from_strips(HeldPixels.of(pixels), name)
 
 
 def environment_from_strips(
-    pixels: Pixels,
-    name: str,
-    file: str = "",
-    sha256: str = "",
-    warnings: tuple[str, ...] = (),
-    progress: Progress = silent,
+    pixels: Pixels, name: str, file: str = "", progress: Progress = silent
 ) -> EnvironmentMap:
-    """The same of pixels that are too many to be held whole."""
+    """The same of pixels that may be too many to be held whole. Held ones must not change."""
     _check_shape(pixels.width, pixels.height, name)
-    found = reduced(pixels, working_width(pixels.width), progress)
-    environment = EnvironmentMap(found.radiance, name, file, sha256, found.repairs, warnings, found)
-    return _not_black(environment)
-
-
-def _not_black(environment: EnvironmentMap) -> EnvironmentMap:
+    width = working_width(pixels.width)
+    if width == pixels.width:
+        radiance = whole(pixels)
+        environment = EnvironmentMap(radiance, name, file, repairs=repair(radiance))
+    else:
+        made = reduced(pixels, width, progress)
+        environment = EnvironmentMap(
+            made.radiance, name, file, repairs=made.repairs, reduction=made
+        )
     if not environment.radiance.any():
-        raise UnusableInput(f"{environment.name} holds no light: every pixel is black.")
+        raise UnusableInput(f"{name} holds no light: every pixel is black.")
     return environment
 
 

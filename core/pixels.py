@@ -37,18 +37,23 @@ class Pixels(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class ArrayPixels:
-    """Pixels that are in memory. radiance: (height, width, 3)."""
+class HeldPixels:
+    """Pixels that are in memory. planes: red, green and blue, (height, width) each."""
 
-    radiance: NDArray[np.float32]
+    planes: Strip
+
+    @classmethod
+    def of(cls, radiance: NDArray[np.floating]) -> HeldPixels:
+        """Of a map, (height, width, 3)."""
+        return cls(tuple(np.moveaxis(radiance, -1, 0)))
 
     @property
     def width(self) -> int:
-        return self.radiance.shape[1]
+        return self.planes[0].shape[1]
 
     @property
     def height(self) -> int:
-        return self.radiance.shape[0]
+        return self.planes[0].shape[0]
 
     @property
     def least_rows(self) -> int:
@@ -56,7 +61,13 @@ class ArrayPixels:
 
     def strips(self, rows: int) -> Iterator[Strip]:
         for top in range(0, self.height, rows):
-            yield tuple(np.moveaxis(self.radiance[top : top + rows], -1, 0))
+            yield tuple(plane[top : top + rows] for plane in self.planes)
+
+
+def whole(pixels: Pixels) -> NDArray[np.float32]:
+    """All of them at once, (height, width, 3)."""
+    strip = next(pixels.strips(pixels.height))
+    return np.stack([plane.astype(np.float32) for plane in strip], axis=-1)
 
 
 def copy_as_float64(plane: NDArray[np.floating], out: NDArray[np.float64]) -> None:

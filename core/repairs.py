@@ -42,15 +42,14 @@ class Repairs:
         )
 
 
-def repair(pixels: NDArray[np.floating]) -> tuple[NDArray[np.float32], Repairs]:
-    """A copy of a whole map, (height, width, 3), without what `repair_planes` repairs."""
-    radiance = np.array(pixels, dtype=np.float32, order="C")
+def repair(radiance: NDArray[np.float32]) -> Repairs:
+    """Repair a whole map, (height, width, 3), in place; see `repair_planes`."""
     # min and max carry NaN along: one pass tells whether there is anything to do.
     if np.isfinite(radiance.max()) and radiance.min() >= 0:
-        return radiance, Repairs()
+        return Repairs()
     planes = np.moveaxis(radiance, -1, 0)
     solid = sphere.row_solid_angles(radiance.shape[1], radiance.shape[0])
-    return radiance, repair_planes(planes, highest_finite(planes), solid)
+    return repair_planes(planes, highest_finite(planes), solid)
 
 
 def repair_planes(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from . import sphere
 from .environment import EnvironmentMap, check_part
-from .pixels import ArrayPixels, Planes, Strip, planes_of
+from .pixels import HeldPixels, Planes, Strip, planes_of
 from .reduction import narrowed
 from .region import RegionLight
 from .settings import ResidualWidth
@@ -45,7 +45,7 @@ def residual_of(
         return residual, None
     check_part(width, own)
     if environment.width % width == 0:
-        return narrowed(ArrayPixels(residual), width), None
+        return narrowed(HeldPixels.of(residual), width), None
     levelled = LevelledPixels(environment, residual)
     return (residual, levelled) if width == own else (narrowed(levelled, width), None)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .. import sphere
 from ..environment import scalar_irradiance, working_width
 from ..errors import UnusableInput
-from ..pixels import Pixels
+from ..pixels import HeldPixels, Pixels, Strip
 from ..reduction import narrowed, rows_of, total_light
 from ..tolerances import HALF_ENERGY, HALF_MAXIMUM
 from . import image
@@ -36,8 +36,9 @@ Window = tuple[NDArray[np.int64], NDArray[np.int64]]
 """First and last pixel, each (x, y)."""
 
 
-def read(path: Path) -> tuple[NDArray[np.floating], list[str]]:
-    """Pixels (height, width, 3) of the file's own type, and warnings for the user.
+def read(path: Path) -> tuple[Pixels, list[str]]:
+    """A map's pixels, of the file's own type, and warnings for the user. Those of a wide map are
+    read a few rows at a time where its file allows.
 
     `exr_layers` says which channels are taken. Raises UnusableInput.
     """
@@ -45,23 +46,12 @@ def read(path: Path) -> tuple[NDArray[np.floating], list[str]]:
     layer, warnings = choose_layer(headers, path.name)
     header = headers[layer.part]
     _check_map(header, path.name)
-    pixels = np.stack(_read_planes(path, layer, header), axis=-1)
-    pixels, remarks = _in_display_window(pixels, header)
-    return pixels, [*warnings, *_colour_warnings(header), *remarks]
-
-
-def open_map(path: Path) -> tuple[NDArray[np.floating] | ExrPixels, list[str]]:
-    """The same, or of a wide map pixels that are read a few rows at a time where its file allows.
-    Raises UnusableInput.
-    """
-    headers = _read_headers(path)
-    layer, warnings = choose_layer(headers, path.name)
-    header = headers[layer.part]
-    _check_map(header, path.name)
+    warnings += _colour_warnings(header)
     pixels = _strips(path, layer, header) if len(headers) == 1 else None
-    if pixels is None:
-        return read(path)
-    return pixels, [*warnings, *_colour_warnings(header)]
+    if pixels is not None:
+        return pixels, warnings
+    planes, remarks = _in_display_window(_read_planes(path, layer, header), header)
+    return HeldPixels(planes), [*warnings, *remarks]
 
 
 def _strips(path: Path, layer: Layer, header: Header) -> ExrPixels | None:
@@ -112,7 +102,7 @@ def _check_map(header: Header, name: str) -> None:
         )
 
 
-def _read_planes(path: Path, layer: Layer, header: Header) -> list[NDArray]:
+def _read_planes(path: Path, layer: Layer, header: Header) -> Strip:
     import OpenEXR
 
     size = _size(_window(header, "dataWindow"))
@@ -136,7 +126,7 @@ def _read_planes(path: Path, layer: Layer, header: Header) -> list[NDArray]:
     # OpenEXR leaves out what it could not read and says why in passing.
     if "MemoryError" in remarks.getvalue():
         raise too_large_for_memory(path.name, *size)
-    planes = [found.get(name) for name in layer.channels]
+    planes = tuple(found.get(name) for name in layer.channels)
     if any(plane is None or plane.shape != (size[1], size[0]) for plane in planes):
         raise damaged_exr(path.name)
     return planes
@@ -152,9 +142,7 @@ def _size(window: Window) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def _in_display_window(
-    pixels: NDArray[np.floating], header: Header
-) -> tuple[NDArray[np.floating], list[str]]:
+def _in_display_window(planes: Strip, header: Header) -> tuple[Strip, list[str]]:
     """Pixels of the whole picture: the display window is the frame, the data window may be a crop.
 
     Except where the header says `envmap` (then the data window is the map, by OpenEXR's rules) or
@@ -162,17 +150,17 @@ def _in_display_window(
     """
     data, display = _window(header, "dataWindow"), _window(header, "displayWindow")
     if "envmap" in header or all(np.array_equal(a, b) for a, b in zip(data, display, strict=True)):
-        return pixels, []
+        return planes, []
     width, height = _size(display)
     if width != 2 * height or not 0 < width * height <= MAXIMUM_PIXELS:
-        return pixels, ["The display window is no map: the data window is taken as the whole map."]
-    whole = np.zeros((height, width, 3), pixels.dtype)
+        return planes, ["The display window is no map: the data window is taken as the whole map."]
+    whole = tuple(np.zeros((height, width), plane.dtype) for plane in planes)
     first, last = np.maximum(data[0], display[0]), np.minimum(data[1], display[1])
     if (first <= last).all():
         columns, rows = (slice(a, b + 1) for a, b in zip(first, last, strict=True))
-        whole[_moved(rows, display[0][1]), _moved(columns, display[0][0])] = pixels[
-            _moved(rows, data[0][1]), _moved(columns, data[0][0])
-        ]
+        into = _moved(rows, display[0][1]), _moved(columns, display[0][0])
+        for plane, out in zip(planes, whole, strict=True):
+            out[into] = plane[_moved(rows, data[0][1]), _moved(columns, data[0][0])]
     own_width, own_height = _size(data)
     return whole, [
         f"The file's {own_width} x {own_height} pixels do not lie where its {width} x {height} "
@@ -254,9 +242,7 @@ def write_strips(path: Path, pixels: Pixels, half: bool) -> NDArray[np.float64]:
 
 def light_of(path: Path) -> NDArray[np.float64]:
     """Scalar irradiance of a map, of each channel, (3,). Raises UnusableInput."""
-    pixels = open_map(path)[0]
-    if isinstance(pixels, np.ndarray):
-        return scalar_irradiance(pixels.astype(np.float32))
+    pixels = read(path)[0]
     solid = sphere.row_solid_angles(pixels.width, pixels.height)
     total, top = np.zeros(3), 0
     for strip in pixels.strips(rows_of(pixels)):

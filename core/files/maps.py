@@ -8,12 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..environment import EnvironmentMap, environment_from_pixels, environment_from_strips
+from ..environment import EnvironmentMap, environment_from_strips
 from ..errors import UnusableInput
-from ..pixels import Pixels
+from ..pixels import HeldPixels, Pixels
 from ..progress import Progress, silent
 from . import exr, image, radiance
 
@@ -26,21 +23,16 @@ def load(path: str | Path, allow_ldr: bool = False, progress: Progress = silent)
     with ThreadPoolExecutor(1) as pool:
         digest = pool.submit(_sha256, path)
         pixels, warnings = _open(path, magic, allow_ldr)
-        if isinstance(pixels, np.ndarray):
-            environment = environment_from_pixels(pixels, path.stem, path.name)
-        else:
-            environment = environment_from_strips(pixels, path.stem, path.name, progress=progress)
+        environment = environment_from_strips(pixels, path.stem, path.name, progress)
         return replace(environment, sha256=digest.result(), warnings=tuple(warnings))
 
 
-def _open(
-    path: Path, magic: bytes, allow_ldr: bool
-) -> tuple[NDArray[np.floating] | Pixels, list[str]]:
+def _open(path: Path, magic: bytes, allow_ldr: bool) -> tuple[Pixels, list[str]]:
     if magic == exr.MAGIC:
-        return exr.open_map(path)
+        return exr.read(path)
     if magic.startswith(radiance.MAGIC):
         return radiance.read(path), []
-    return image.read(path, allow_ldr), []
+    return HeldPixels.of(image.read(path, allow_ldr)), []
 
 
 def _first_bytes(path: Path) -> bytes:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..environment import working_width
 from ..errors import UnusableInput
+from ..pixels import HeldPixels, Pixels
 from . import image
 from .limits import refuse_absurd_size
 from .strips import HdrPixels
@@ -56,9 +57,8 @@ class _Header:
         return self.length if self.by_columns else self.scanlines
 
 
-def read(path: Path) -> NDArray[np.float32] | HdrPixels:
-    """Pixels (height, width, 3), linear, upright, or a wide map's a few rows at a time. Raises
-    UnusableInput.
+def read(path: Path) -> Pixels:
+    """Linear pixels, upright; a wide map's are read a few rows at a time. Raises UnusableInput.
 
     EXPOSURE, PRIMARIES and the like are left alone, as Blender does: many programs write nonsense
     there, and a constant factor changes no split.
@@ -77,7 +77,7 @@ def read(path: Path) -> NDArray[np.float32] | HdrPixels:
         stored = _from_rgbe(_read_old(path, header))
     if stored.shape != (header.scanlines, header.length, 3):
         raise UnusableInput(f"{path.name} is damaged: its pixels do not fill its frame.")
-    return _upright(stored, header)
+    return HeldPixels.of(_upright(stored, header))
 
 
 def _read_header(head: bytes, name: str) -> _Header:
@@ -162,4 +162,4 @@ def _upright(stored: NDArray[np.float32], header: _Header) -> NDArray[np.float32
     pixels = stored.swapaxes(0, 1) if header.by_columns else stored
     rows = slice(None, None, -1 if header.upwards else 1)
     columns = slice(None, None, -1 if header.leftwards else 1)
-    return np.ascontiguousarray(pixels[rows, columns])
+    return pixels[rows, columns]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .. import sphere
 from ..errors import UnusableInput
+from ..pixels import whole
 from ..samples import MapOfSamples
 from . import exr
 from .lights_json import AXES, read_document
@@ -57,7 +58,7 @@ def read_samples(path: str | Path) -> MapOfSamples:
         raise UnusableInput(f"{path.name} is damaged: {error!r}.") from error
     if not image.exists():
         raise UnusableInput(f"{image} is missing: convert the map again.")
-    radiance = exr.read(image)[0].astype(np.float32)
+    radiance = whole(exr.read(image)[0])
     if radiance.shape != shape:
         raise UnusableInput(f"{image.name} is another map than {path.name} says.")
     return MapOfSamples(sites, flux, area, radiance)

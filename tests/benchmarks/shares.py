@@ -22,7 +22,7 @@ from sunsplit.core import ConversionSettings, EnvironmentMap, convert, load, sph
 from sunsplit.core.conversion import Conversion
 from sunsplit.core.environment import LUMINANCE_WEIGHTS
 from sunsplit.core.patches import patches_of
-from sunsplit.core.pixels import ArrayPixels
+from sunsplit.core.pixels import HeldPixels
 from sunsplit.core.reduction import narrowed
 from sunsplit.core.region import light_of_map
 from sunsplit.core.sampling import choose_sampling
@@ -121,7 +121,7 @@ def _noise(occluders: Occluders, radiance: np.ndarray, to_table: float) -> np.nd
     """Variance of a ray of the surface's own, by the cosine, and, for a part of the samples, one by
     a table of the residual's light; both weighted by the balance heuristic."""
     width = min(COARSE, radiance.shape[1])
-    bright = (narrowed(ArrayPixels(radiance), width) @ LUMINANCE_WEIGHTS).reshape(-1, 1)
+    bright = (narrowed(HeldPixels.of(radiance), width) @ LUMINANCE_WEIGHTS).reshape(-1, 1)
     directions = sphere.pixel_directions(np.arange(len(bright)), width, width // 2)
     flux = bright * np.repeat(sphere.row_solid_angles(width, width // 2), width)[:, None]
     by_table = to_table * bright / flux.sum()

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from sunsplit.core import ConversionSettings, convert, load, sphere
 from sunsplit.core.errors import SunsplitError
-from sunsplit.core.pixels import ArrayPixels
+from sunsplit.core.pixels import HeldPixels
 from sunsplit.core.reduction import narrowed
 from sunsplit.core.settings import BadSetting
 from sunsplit.core.tolerances import ACCOUNT, EQUIVARIANCE
@@ -294,7 +294,7 @@ def test_a_narrower_residual_keeps_the_account(sunrise, width):
 def test_a_narrower_residual_keeps_light_where_it_is():
     pixels = sky(64, 0.0)
     pixels[10:12, 20:22] = np.array([[1, 2], [3, 4]])[..., None]
-    found = narrowed(ArrayPixels(pixels.astype(np.float32)), 32)
+    found = narrowed(HeldPixels.of(pixels.astype(np.float32)), 32)
     lit = np.argwhere(found.any(axis=-1))
     assert lit.tolist() == [[5, 10]]
 

@@ -21,7 +21,7 @@ from sunsplit.core.environment import (
     working_width,
 )
 from sunsplit.core.errors import UnusableInput
-from sunsplit.core.pixels import ArrayPixels, copy_as_float64, highest_light, planes_of
+from sunsplit.core.pixels import HeldPixels, copy_as_float64, highest_light, planes_of
 from sunsplit.core.reduction import narrowed, reduced
 from sunsplit.core.repairs import repair
 from sunsplit.core.residual import levels_of
@@ -112,14 +112,15 @@ def test_rows_are_repaired_as_a_whole_map_is(places, kind):
     pixels = noise(16).astype(kind)
     for place, value in places.items():
         pixels[place] = value
-    whole, repairs = repair(pixels)
+    whole = pixels.astype(np.float32)
+    repairs = repair(whole)
     before = reduction.ROWS, reduction.PIXELS
     try:
         reduction.ROWS = reduction.PIXELS = 2
         found = reduced(Raw(pixels), 16)
     finally:
         reduction.ROWS, reduction.PIXELS = before
-    assert found.radiance == pytest.approx(narrowed(ArrayPixels(whole), 16), rel=1e-6)
+    assert found.radiance == pytest.approx(narrowed(HeldPixels.of(whole), 16), rel=1e-6)
     assert str(found.repairs) == str(repairs)
     assert found.repairs.negative_energy == pytest.approx(repairs.negative_energy, rel=1e-12)
     again = [np.stack(strip, axis=-1) for strip in found.pixels.strips(4)]
@@ -177,7 +178,7 @@ def test_a_residual_with_all_pixels_closes_everywhere(wide):
     rows = [np.stack(strip, axis=-1) for strip in levelled.strips(256)]
     whole = np.concatenate(rows)
     assert whole.shape == (2048, 4096, 3)
-    assert narrowed(ArrayPixels(whole), 1024) == pytest.approx(conversion.residual, rel=2e-6)
+    assert narrowed(HeldPixels.of(whole), 1024) == pytest.approx(conversion.residual, rel=2e-6)
     before = sunny(4096)
     assert (whole <= before).all()
     assert (whole < before).any(axis=-1).mean() < 1e-3
