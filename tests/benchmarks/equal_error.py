@@ -22,13 +22,12 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from scipy.ndimage import zoom
 
 from sunsplit.addon.scene import convert_scene
-from sunsplit.core.files import exr
 from sunsplit.core.files.maps import load
 from sunsplit.core.settings import ConversionSettings
 from tests.benchmarks import equal_error_report
+from tests.benchmarks.large_maps import Kind, make
 from tests.benchmarks.scenes import SCENES
 from tests.blender import timed_render
 
@@ -112,15 +111,11 @@ def _peak(file: Path) -> float:
 
 def enlarged(path: Path, width: int, folder: Path) -> Path:
     """The map, or one so wide, linear between its pixels, in the folder."""
-    world = load(path)
-    times = width // world.width
-    if times <= 1:
+    if width <= load(path).own_width:
         return path
-    # Around the seam the map goes on.
-    around = np.concatenate([world.radiance[:, -2:], world.radiance, world.radiance[:, :2]], axis=1)
-    wide = zoom(around, (times, times, 1), order=1, mode="nearest", grid_mode=True)
-    exr.write(folder / f"{path.stem}.exr", wide[:, 2 * times : -2 * times])
-    return folder / f"{path.stem}.exr"
+    file = folder / f"{path.stem}.exr"
+    make(path, width, Kind("exr", "float", "zip"), file, grain=0)
+    return file
 
 
 def _prepared(path: Path, scene: str, options: argparse.Namespace, folder: Path) -> dict[str, int]:

@@ -44,11 +44,13 @@ KINDS = (
 )
 
 
-def enlarged(source: Path, width: int) -> Iterator[NDArray[np.float32]]:
+def enlarged(
+    source: Path, width: int, brightest: float = np.inf, grain: float = GRAIN
+) -> Iterator[NDArray[np.float32]]:
     """A map at another width, ROWS rows at a time (fewer at the end): bilinear between the small
-    map's pixels, times grain."""
+    map's pixels, times grain. A map that is brighter is dimmed."""
     small = load(source).radiance
-    small = small * np.float32(min(BRIGHTEST / small.max(), 1))
+    small = small * np.float32(min(brightest / small.max(), 1))
     random = np.random.default_rng(width)
     height, factor = width // 2, width / small.shape[1]
     column = (np.arange(width) + 0.5) / factor - 0.5
@@ -63,11 +65,13 @@ def enlarged(source: Path, width: int) -> Iterator[NDArray[np.float32]]:
         lines += small[np.clip(above + 1, 0, last)] * down
         strip = lines[:, left % small.shape[1]] * (1 - across)
         strip += lines[:, (left + 1) % small.shape[1]] * across
-        grain = random.standard_normal((*strip.shape[:2], 1), dtype=np.float32)
-        yield strip * np.exp(np.float32(GRAIN) * grain - np.float32(GRAIN**2 / 2))
+        if grain:
+            noise = random.standard_normal((*strip.shape[:2], 1), dtype=np.float32)
+            strip *= np.exp(np.float32(grain) * noise - np.float32(grain**2 / 2))
+        yield strip
 
 
-def make(source: Path, width: int, kind: Kind, path: Path) -> None:
+def make(source: Path, width: int, kind: Kind, path: Path, grain: float = GRAIN) -> None:
     """Write an enlarged map."""
     import OpenImageIO as oiio
 
@@ -78,7 +82,8 @@ def make(source: Path, width: int, kind: Kind, path: Path) -> None:
     if not out or not out.open(str(path), spec):
         raise OSError(oiio.geterror())
     top = 0
-    for strip in enlarged(source, width):
+    brightest = BRIGHTEST if kind.pixel == "half" else np.inf
+    for strip in enlarged(source, width, brightest, grain):
         out.write_scanlines(top, top + len(strip), 0, strip)
         top += len(strip)
     out.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from sunsplit.core.files.maps import load
 from tests.benchmarks import (
+    conversion,
     equal_error,
     light_tree,
     lights,
@@ -52,9 +54,24 @@ def test_equal_error_of_an_enlarged_map(tmp_path, sunrise):
     assert (tmp_path / "wide.png").stat().st_size > 0
 
 
+def test_conversion(tmp_path, monkeypatch, sunrise):
+    few = ["--widths", "1024", "2048", "--kinds", "hdr", "exr half dwab", "--repeat", "1"]
+    monkeypatch.setattr(sys, "argv", ["conversion", str(sunrise), *few, "-o", str(tmp_path)])
+    conversion.main()
+    found = json.loads((tmp_path / "conversion.json").read_text())
+    assert [(one["width"], one["kind"]) for one in found] == [
+        *((1024, "hdr"), (1024, "exr half dwab"), (2048, "hdr"), (2048, "exr half dwab"))
+    ]
+    for one in found:
+        assert one["whole"] == pytest.approx(sum(one["stages"].values()))
+        assert min(one["stages"].values()) > 0
+        assert 0 < one["peak"] < 400e6
+    assert (tmp_path / "conversion.png").stat().st_size > 0
+
+
 def test_an_enlarged_map_keeps_its_light(tmp_path, sunrise):
     wide, own = load(equal_error.enlarged(sunrise, 2048, tmp_path)), load(sunrise)
-    assert wide.width == 2 * own.width
+    assert wide.own_width == 2 * own.width
     assert wide.scalar_irradiance == pytest.approx(own.scalar_irradiance, rel=0.01)
 
 
