@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from . import sphere
 from .errors import UnusableInput
 from .memo import Memo
+from .sums import weighted_sum
 from .tolerances import HALF_MAXIMUM
 
 LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
@@ -180,7 +181,7 @@ def scalar_irradiance(radiance: NDArray[np.floating]) -> NDArray[np.float64]:
     """Integral of radiance over the whole sphere, per channel, float64, shape (3,)."""
     height, width = radiance.shape[:2]
     rows = radiance.sum(axis=1, dtype=np.float64)
-    return sphere.row_solid_angles(width, height) @ rows
+    return weighted_sum(sphere.row_solid_angles(width, height), rows)
 
 
 def whole_part(width: int, most: int) -> int:

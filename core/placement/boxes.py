@@ -100,10 +100,10 @@ def variance(light: RegionLight, count: int) -> Placement:
         """Flux and its vector sum (x, y, z) of each row or column of a box, (4, k)."""
         rows, columns = slice(box.top, box.bottom), slice(box.left, box.right)
         if axis == 0:
-            flux, x, y = azimuth_parts[:, columns] @ box.of(plane).T
+            flux, x, y = np.einsum("ac,rc->ar", azimuth_parts[:, columns], box.of(plane))
             _, ring, up = polar_parts[:, rows]
             return np.stack([flux, x * ring, y * ring, flux * up])
-        flux, ring, up = polar_parts[:, rows] @ box.of(plane)
+        flux, ring, up = np.einsum("ar,rc->ac", polar_parts[:, rows], box.of(plane))
         _, x, y = azimuth_parts[:, columns]
         return np.stack([flux, x * ring, y * ring, up])
 
