@@ -123,7 +123,9 @@ def repair(pixels: NDArray[np.floating]) -> tuple[NDArray[np.float32], Repairs]:
     +Inf: the channel's largest finite value, but at least the largest half, because that is the
     bound that an overflowing half file has passed. Negative values and -Inf: 0.
     """
-    radiance = np.array(pixels, dtype=np.float32, order="C")
+    # What float32 cannot hold becomes infinite, and a signalling NaN an ordinary one: both below.
+    with np.errstate(over="ignore", invalid="ignore"):
+        radiance = np.array(pixels, dtype=np.float32, order="C")
     # min and max carry NaN along: one pass tells whether there is anything to do.
     if np.isfinite(radiance.max()) and radiance.min() >= 0:
         return radiance, Repairs()
