@@ -112,9 +112,10 @@ def variance(light: RegionLight, count: int) -> Placement:
         for axis, length in ((0, box.bottom - box.top), (1, box.right - box.left)):
             if length == 1:
                 continue
-            before = np.cumsum(moments(box, axis), axis=1)
-            first, second = before[:, :-1], before[:, -1:] - before[:, :-1]
-            worse = np.maximum(_spread(first), _spread(second))
+            each = moments(box, axis)
+            # From either end: what is next to nothing is lost in a difference of two large sums.
+            first, second = np.cumsum(each, axis=1), np.cumsum(each[:, ::-1], axis=1)[:, ::-1]
+            worse = np.maximum(_spread(first[:, :-1]), _spread(second[:, 1:]))
             at = int(np.argmin(worse))
             if worse[at] < least:
                 best, least = (axis, at + 1), worse[at]
