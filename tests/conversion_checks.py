@@ -91,7 +91,7 @@ def fingerprint(conversion: Conversion) -> str:
     return hashlib.sha256(parts + repr(conversion.notes).encode()).hexdigest()
 
 
-THREADED = ("share 0.5", "black", "variance")
+THREADED = ("share 0.5", "variance")
 
 
 def write_fingerprints() -> None:

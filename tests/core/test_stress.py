@@ -51,18 +51,18 @@ def test_any_method_for_all_of_a_map_of_all_decades(method):
 
 @pytest.mark.parametrize(("number", "choice"), list(enumerate(CHOICES)))
 def test_any_choice(number, choice):
-    """A fifth of the maps each, the next choice another fifth."""
-    for pixels in list(MAPS.values())[number % 5 :: 5]:
+    """An eighth of the maps each, the next choice another eighth."""
+    for pixels in list(MAPS.values())[number % 8 :: 8]:
         converted(pixels, CHOICES[choice])
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(extreme_maps(), any_choices())
 def test_any_map_by_any_choice(pixels, chosen):
     converted(pixels, chosen)
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(extreme_maps(), any_choices())
 def test_again_is_the_same_to_the_bit(pixels, chosen):
     first, second = (convert(environment(pixels), chosen) for _ in range(2))
@@ -85,7 +85,7 @@ def in_threads(count):
 
 def test_any_number_of_threads_gives_the_same_to_the_bit():
     one, two = in_threads(1), in_threads(2)
-    assert len(one) == 3
+    assert len(one) == 2
     assert one == two
 
 
@@ -109,7 +109,7 @@ def moved(pixels, columns, mirrored):
     return np.roll(pixels[:, ::-1] if mirrored else pixels, columns, axis=1)
 
 
-@settings(max_examples=30)
+@settings(max_examples=20)
 @given(extreme_maps(), st.sampled_from(METHODS), st.integers(0, 40), st.booleans())
 def test_turned_or_mirrored_the_light_goes_along(pixels, method, columns, mirrored):
     chosen = ConversionSettings(method=method, lights=1, share=0.5)
