@@ -15,6 +15,7 @@ from .pixels import HeldPixels, Pixels, whole
 from .progress import Progress, silent
 from .reduction import LUMINANCE_WEIGHTS, Reduction, narrowed, reduced
 from .repairs import Repairs, repair
+from .sums import weighted_sum
 
 WIDE = 1024
 """Pixels of a map's width from which it is looked at narrowed: a third of a degree each, which is
@@ -155,7 +156,7 @@ def scalar_irradiance(radiance: NDArray[np.floating]) -> NDArray[np.float64]:
     height, width = radiance.shape[:2]
     # Channel by channel, which takes a tenth of the time of all at once.
     rows = [radiance[..., channel].sum(axis=1, dtype=np.float64) for channel in range(3)]
-    return np.stack(rows) @ sphere.row_solid_angles(width, height)
+    return weighted_sum(sphere.row_solid_angles(width, height), np.stack(rows, axis=-1))
 
 
 def whole_part(width: int, most: int) -> int:

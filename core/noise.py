@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
+from .sums import weighted_sum
 
 Floats = NDArray[np.float64]
 
@@ -121,7 +122,8 @@ def borders(lum: Floats, solid: Floats) -> Borders:
     """
     height, width = lum.shape
     weight, flat = np.repeat(solid, width), lum.ravel()
-    light = float(weight @ flat)
+    light = float(weighted_sum(solid, lum.sum(axis=1)))
+    square = float(weighted_sum(solid, (lum**2).sum(axis=1)))
     level = _levels(float(flat.max()), LOWEST * light / (4 * np.pi))
     bright = np.flatnonzero(flat > level[-1])
     bright = bright[np.argsort(-flat[bright], kind="stable")]
@@ -138,7 +140,7 @@ def borders(lum: Floats, solid: Floats) -> Borders:
     return Borders(
         level,
         unit * (square_from_one_place(suns) - mean_square_irradiance(suns)),
-        unit * (np.pi / 4 * (weight @ flat**2 - above) - mean_square_irradiance(rest)),
+        unit * (np.pi / 4 * (square - above) - mean_square_irradiance(rest)),
     )
 
 
@@ -166,4 +168,4 @@ def _all_harmonics(light: Floats) -> Floats:
     blocks = np.add.reduceat(np.add.reduceat(light, rows, axis=0), columns, axis=1)
     down, across = (np.append(rows, height) / height, np.append(columns, width) / width)
     u, v = np.meshgrid((across[1:] + across[:-1]) / 2, (down[1:] + down[:-1]) / 2)
-    return blocks.ravel() @ harmonics(sphere.to_directions(u.ravel(), v.ravel()))
+    return weighted_sum(blocks.ravel(), harmonics(sphere.to_directions(u.ravel(), v.ravel())))

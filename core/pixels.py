@@ -66,8 +66,8 @@ class HeldPixels:
 
 def whole(pixels: Pixels) -> NDArray[np.float32]:
     """All of them at once, (height, width, 3)."""
-    strip = next(pixels.strips(pixels.height))
-    return np.stack([plane.astype(np.float32) for plane in strip], axis=-1)
+    planes = planes_of(next(pixels.strips(pixels.height)))
+    return np.ascontiguousarray(np.moveaxis(planes, 0, -1))
 
 
 def copy_as_float64(plane: NDArray[np.floating], out: NDArray[np.float64]) -> None:
@@ -83,8 +83,12 @@ def planes_of(strip: Strip) -> Planes:
     """A copy of some rows."""
     planes = np.empty((3, *strip[0].shape), np.float32)
     for plane, out in zip(strip, planes, strict=True):
-        halfs = plane.dtype == np.float16 and highest_light(plane) >= 0
-        out[...] = _as_single(plane) if halfs else plane
+        if plane.dtype == np.float16 and highest_light(plane) >= 0:
+            out[...] = _as_single(plane)
+            continue
+        # What float32 cannot hold becomes infinite, and a signalling NaN an ordinary one.
+        with np.errstate(over="ignore", invalid="ignore"):
+            out[...] = plane
     return planes
 
 
@@ -102,7 +106,7 @@ def _as_single(plane: NDArray[np.float16]) -> NDArray[np.float32]:
 
 
 def highest_light(plane: NDArray[np.floating]) -> float:
-    """The largest number; nan unless all are finite and not below 0 (or -0)."""
+    """The largest number; nan unless all are finite as float32 and not below 0 (or -0)."""
     if plane.dtype == np.float16:  # as integers they are in the same order, and compared faster
         highest = int(plane.view(np.uint16).max())
         return float(np.uint16(highest).view(np.float16)) if highest < 0x7C00 else np.nan
@@ -110,4 +114,4 @@ def highest_light(plane: NDArray[np.floating]) -> float:
         bits = plane.view(np.uint32).max()
         return float(bits.view(np.float32)) if bits < 0x7F800000 else np.nan
     highest = float(plane.max())  # carries nan along
-    return highest if plane.min() >= 0 and highest < np.inf else np.nan
+    return highest if plane.min() >= 0 and highest <= np.finfo(np.float32).max else np.nan

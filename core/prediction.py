@@ -17,6 +17,7 @@ from . import sphere
 from .environment import LUMINANCE_WEIGHTS
 from .patches import Patches
 from .shadow_edges import facing_up, half_widths
+from .sums import weighted_sum
 from .suns import Sun, disc_on_ground
 
 Floats = NDArray[np.float64]
@@ -68,7 +69,7 @@ class Surfaces:
             seen += 0.5
             np.clip(seen, 0, 1, out=seen)
             seen *= np.maximum(directions[part] @ self.normals.T, 0)
-            total += flux[part] @ seen
+            total += weighted_sum(flux[part], seen)
         return total
 
     def of(self, patches: Patches) -> Floats:
@@ -161,7 +162,7 @@ class Prediction:
 def _parts(flux: Floats, seen: Floats) -> Floats:
     """Of each channel of all light, flux (n, 3), the part that is seen; nan of no light."""
     total = flux.sum(axis=0)
-    return np.where(total > 0, seen @ flux / np.where(total > 0, total, 1), np.nan)
+    return np.where(total > 0, weighted_sum(seen, flux) / np.where(total > 0, total, 1), np.nan)
 
 
 def _pieces(suns: Sequence[Sun]) -> tuple[Floats, Floats, Floats]:

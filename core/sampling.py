@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from . import sphere
 from .environment import LUMINANCE_WEIGHTS, luminance
 from .noise import OTHERWISE, harmonics, mean_square_irradiance, square_from_one_place
+from .sums import weighted_sum
 from .suns import Sun
 from .visible import VisiblePart
 
@@ -108,8 +109,9 @@ def contrast(
     area = 4 * np.pi
     if visible:
         lum = visible.of(lum)
-        area = float(visible.pixels(lum.shape[1], lum.shape[0]).sum(axis=1) @ solid)
-    mean = float(lum.sum(axis=1) @ solid) / area
+        area = float(weighted_sum(solid, visible.pixels(lum.shape[1], lum.shape[0]).sum(axis=1)))
+    mean = float(weighted_sum(solid, lum.sum(axis=1))) / area
     if mean == 0:
         return 1.0, 1.0
-    return float((lum**2).sum(axis=1) @ solid) / area / mean**2, float(lum.max()) / mean
+    square = float(weighted_sum(solid, (lum**2).sum(axis=1))) / area
+    return square / mean**2, float(lum.max()) / mean

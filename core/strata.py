@@ -16,6 +16,7 @@ from . import sphere
 from .environment import EnvironmentMap
 from .memo import Memo
 from .noise import borders
+from .sums import weighted_sum
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,8 @@ class Strata(Memo):
     def light(self) -> float:
         """Luminance of the whole map's scalar irradiance."""
         height, width = self.luminance.shape
-        return float(self.luminance.sum(axis=1) @ sphere.row_solid_angles(width, height))
+        solid = sphere.row_solid_angles(width, height)
+        return float(weighted_sum(solid, self.luminance.sum(axis=1)))
 
     @cached_property
     def part_on_ground(self) -> float:
@@ -49,13 +51,15 @@ class Strata(Memo):
         height, width = self.luminance.shape
         solid = sphere.row_solid_angles(width, height)
         facing = np.maximum(np.cos(sphere.centroid_angles(width, height)[1]), 0)
-        return max(float(self.luminance.sum(axis=1) @ (solid * facing)) / self.light, 1 / 40)
+        ground = weighted_sum(solid * facing, self.luminance.sum(axis=1))
+        return max(float(ground) / self.light, 1 / 40)
 
     @cached_property
     def square(self) -> float:
         """4 pi (integral of luminance squared) / light^2; 1 for a constant map."""
         height, width = self.luminance.shape
-        integral = (self.luminance**2).sum(axis=1) @ sphere.row_solid_angles(width, height)
+        solid = sphere.row_solid_angles(width, height)
+        integral = weighted_sum(solid, (self.luminance**2).sum(axis=1))
         return float(4 * np.pi * integral / self.light**2)
 
     @property
@@ -102,8 +106,8 @@ def stratify_at(lum: NDArray[np.float64], threshold: float, count: int) -> Strat
 
 
 def _part_below(threshold: float, lum: NDArray[np.float64], solid: NDArray[np.float64]) -> float:
-    dark = np.where(lum <= threshold, lum, 0.0).sum(axis=1) @ solid
-    return float(dark / (lum.sum(axis=1) @ solid))
+    dark = weighted_sum(solid, np.where(lum <= threshold, lum, 0.0).sum(axis=1))
+    return float(dark / weighted_sum(solid, lum.sum(axis=1)))
 
 
 @dataclass(frozen=True, eq=False)

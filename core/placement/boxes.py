@@ -100,10 +100,10 @@ def variance(light: RegionLight, count: int) -> Placement:
         """Flux and its vector sum (x, y, z) of each row or column of a box, (4, k)."""
         rows, columns = slice(box.top, box.bottom), slice(box.left, box.right)
         if axis == 0:
-            flux, x, y = azimuth_parts[:, columns] @ box.of(plane).T
+            flux, x, y = np.einsum("ac,rc->ar", azimuth_parts[:, columns], box.of(plane))
             _, ring, up = polar_parts[:, rows]
             return np.stack([flux, x * ring, y * ring, flux * up])
-        flux, ring, up = polar_parts[:, rows] @ box.of(plane)
+        flux, ring, up = np.einsum("ar,rc->ac", polar_parts[:, rows], box.of(plane))
         _, x, y = azimuth_parts[:, columns]
         return np.stack([flux, x * ring, y * ring, up])
 
@@ -112,9 +112,10 @@ def variance(light: RegionLight, count: int) -> Placement:
         for axis, length in ((0, box.bottom - box.top), (1, box.right - box.left)):
             if length == 1:
                 continue
-            before = np.cumsum(moments(box, axis), axis=1)
-            first, second = before[:, :-1], before[:, -1:] - before[:, :-1]
-            worse = np.maximum(_spread(first), _spread(second))
+            each = moments(box, axis)
+            # From either end: what is next to nothing is lost in a difference of two large sums.
+            first, second = np.cumsum(each, axis=1), np.cumsum(each[:, ::-1], axis=1)[:, ::-1]
+            worse = np.maximum(_spread(first[:, :-1]), _spread(second[:, 1:]))
             at = int(np.argmin(worse))
             if worse[at] < least:
                 best, least = (axis, at + 1), worse[at]

@@ -16,6 +16,7 @@ from ..environment import LUMINANCE_WEIGHTS
 from ..patches import Patches
 from ..settings import Shape
 from ..shadow_edges import cap_beyond, edges_across, facing_up, half_widths
+from ..sums import weighted_sum
 from ..suns import disc_diameter, disc_on_ground
 
 Floats = NDArray[np.float64]
@@ -53,8 +54,9 @@ turn the widths of whole cells at each step, and never settle."""
 A_PART = 0.1
 """Of all light, what the bright or the faint part has at least: a sun's dark rim is none."""
 
-DISTANCES = 1 << 16
-"""Distances of patches to cells that are held in memory at a time."""
+DISTANCES = 1 << 14
+"""Distances of patches to cells that are worked out at a time: few enough for a processor's own
+memory, and so few that BLAS gives them to one thread (see `sums`)."""
 
 CELLS = 512
 """Cells whose edges are held in memory at a time."""
@@ -100,8 +102,8 @@ class EdgeLight:
         luminous = self.patches.flux @ LUMINANCE_WEIGHTS
         luminous /= luminous.sum()
         octaves = np.log2(np.maximum(self.patches.brightness, 1e-300))
-        bright = octaves > luminous @ octaves
-        if not A_PART < luminous @ bright < 1 - A_PART:
+        bright = octaves > weighted_sum(luminous, octaves)
+        if not A_PART < luminous[bright].sum() < 1 - A_PART:
             return self
         return replace(self, part=bright.astype(np.intp))
 
@@ -191,7 +193,7 @@ class EdgeLight:
             return part
         directions = self.patches.directions[members]
         weight = self._weight(members, np.zeros(len(members), np.intp), 1)
-        offset = directions - (weight @ directions) / weight.sum()
+        offset = directions - weighted_sum(weight, directions) / weight.sum()
         _, axes = np.linalg.eigh((offset * weight[:, None]).T @ offset)
         first = offset @ axes[:, -1] < 0
         return first if first.any() and not first.all() else None
@@ -236,12 +238,13 @@ class EdgeLight:
             of_cells.append(aside)
         cell_parts = np.concatenate(of_cells, axis=1).T
         owner = np.empty(len(self.patches), np.intp)
-        at_once = max(DISTANCES // count, 1)
+        # Two patches at least, as one alone is another kind of product, with limits of its own.
+        at_once = min(max(DISTANCES // count, 2), len(owner))
         distances = np.empty((at_once, count))
         for start in range(0, len(owner), at_once):
-            features = self.features[start : start + at_once]
-            some = np.matmul(features, cell_parts, out=distances[: len(features)])
-            owner[start : start + at_once] = np.argmin(some, axis=1)
+            some = slice(min(start, len(owner) - at_once), start + at_once)
+            np.matmul(self.features[some], cell_parts, out=distances)
+            owner[some] = np.argmin(distances, axis=1)
         stays = self.light > HEAVY * whole[cells.owner]
         owner[stays] = cells.owner[stays]
         return owner
