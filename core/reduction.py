@@ -20,6 +20,7 @@ from . import sphere
 from .pixels import Pixels, Strip, copy_as_float64, highest_light, planes_of
 from .progress import Progress, silent
 from .repairs import RepairedPixels, Repairs, highest_finite, repair_planes, repaired_strips
+from .sums import weighted_sum
 
 Floats = NDArray[np.float64]
 
@@ -99,8 +100,8 @@ def rows_of(pixels: Pixels, step: int = 1) -> int:
 
 def total_light(strip: Strip, solid: Floats) -> Floats:
     """Scalar irradiance that some rows give, (3,). solid: angle of a pixel of each row."""
-    rows = np.stack([plane.sum(axis=1, dtype=np.float64) for plane in strip])
-    return rows @ solid
+    rows = [plane.sum(axis=1, dtype=np.float64) for plane in strip]
+    return weighted_sum(solid, np.stack(rows, axis=-1))
 
 
 def _sums_of_columns(strip: Strip, weights: Floats, step: int) -> Iterator[tuple[int, Floats]]:
