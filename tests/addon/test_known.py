@@ -46,7 +46,7 @@ def test_a_world_that_is_turned_is_not_converted_anew(scene, monkeypatch):
 
 def test_other_settings_are_another_conversion_of_the_same_map(scene, monkeypatch):
     bpy.ops.sunsplit.convert(lights=1)
-    monkeypatch.setattr("sunsplit.addon.world.environment_from_pixels", None)  # would raise
+    monkeypatch.setattr("sunsplit.addon.world.environment_from_strips", None)  # would raise
     bpy.ops.sunsplit.convert(lights=4, share=0.9)
     assert len(suns(scene)) > 1
 
