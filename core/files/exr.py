@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..environment import scalar_irradiance
-from ..errors import CannotWrite, UnusableInput
+from ..errors import UnusableInput
 from ..tolerances import HALF_ENERGY, HALF_MAXIMUM
 from .exr_layers import Channel, Layer, choose_layer
 from .limits import MAXIMUM_PIXELS, refuse_absurd_size, too_large_for_memory
@@ -170,7 +170,7 @@ def write(path: Path, radiance: NDArray[np.float32], compressed: bool = True) ->
     """Write a map as half floats where they are enough, else as float32.
 
     radiance: (height, width, 3), linear Rec.709. compressed: by ZIP, which takes most of the time.
-    Raises CannotWrite.
+    Raises OSError.
     """
     import OpenEXR
 
@@ -188,8 +188,5 @@ def write(path: Path, radiance: NDArray[np.float32], compressed: bool = True) ->
             OpenEXR.File(header, {"RGB": np.ascontiguousarray(stored)}) as file,
         ):
             file.write(stream)
-    except (OSError, RuntimeError) as error:
-        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
-        raise CannotWrite(
-            f"Cannot write into {path.parent}: {reason}. Nothing was changed."
-        ) from error
+    except RuntimeError as error:
+        raise OSError(None, " ".join(str(error).split())) from error

@@ -11,6 +11,7 @@ import numpy as np
 from ..account import Account
 from ..errors import UnusableInput
 from ..suns import Sun
+from .atomic import finish_interrupted
 
 FORMAT = "sunsplit.lights"
 VERSION = 1
@@ -43,18 +44,23 @@ def write(path: Path, document: dict[str, Any]) -> None:
 
 
 def read(path: Path) -> tuple[dict[str, Any], tuple[Sun, ...], Account]:
-    """The whole document, its suns and its account. Raises UnusableInput."""
-    document = read_document(path, FORMAT, VERSION)
+    """The whole document, its suns and its account. Raises UnusableInput.
+
+    What a killed process had begun to write there is finished first.
+    """
+    finish_interrupted(path.parent)
+    document = read_document(path)
     try:
         suns = tuple(_sun(entry) for entry in document["suns"])
         account = Account(*(np.array(document["account"][k]) for k in _ACCOUNT_PARTS))
-        document["residual"]  # may be null, but must be there
+        if document["residual"]:  # may be null, but must be there
+            str(document["residual"]["file"])
     except (KeyError, TypeError, ValueError) as error:
         raise UnusableInput(f"{path.name} is damaged: {error!r} in its suns or account.") from error
     return document, suns, account
 
 
-def read_document(path: Path, file_format: str, version: int) -> dict[str, Any]:
+def read_document(path: Path, file_format: str = FORMAT, version: int = VERSION) -> dict[str, Any]:
     """A JSON file of ours, of one format and version. Raises UnusableInput."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
