@@ -129,7 +129,8 @@ def repair(pixels: NDArray[np.floating]) -> tuple[NDArray[np.float32], Repairs]:
     nan = np.isnan(radiance)
     infinite = np.isposinf(radiance)
     negative = radiance < 0
-    lost = np.where(np.isfinite(radiance) & negative, -radiance.astype(np.float64), 0.0)
+    # Widened last: to widen a signalling NaN is an invalid operation.
+    lost = -np.where(np.isfinite(radiance) & negative, radiance, 0).astype(np.float64)
     solid = sphere.row_solid_angles(radiance.shape[1], radiance.shape[0])
     radiance[negative] = 0
     for channel in range(3):

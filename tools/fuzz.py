@@ -79,10 +79,16 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def fuzz(seed: int, first: int, end: int) -> Iterator[Result]:
-    """Results of the files from `first` to before `end`, in order, one process at a time."""
+def fuzz(
+    seed: int, first: int, end: int, worker: str = "tools.fuzz_worker", seconds: float = SECONDS
+) -> Iterator[Result]:
+    """Results of the files from `first` to before `end`, in order, one process at a time.
+
+    worker: the module that reads them. seconds: that it may take for each, starting up included.
+    Raises RuntimeError when it does not start.
+    """
     while first < end:
-        for result in _turn(seed, first, min(first + TURN, end)):
+        for result in _turn(seed, first, min(first + TURN, end), worker, seconds):
             yield result
             first = result.number + 1
 
@@ -97,13 +103,13 @@ def table(results: list[Result]) -> str:
     return "\n".join(lines)
 
 
-def _turn(seed: int, first: int, end: int) -> Iterator[Result]:
+def _turn(seed: int, first: int, end: int, module: str, seconds: float) -> Iterator[Result]:
     """Results until the worker has ended, whether well or not."""
     with tempfile.TemporaryDirectory() as folder:
         read, write = os.pipe()
         numbers = map(str, (seed, first, end, write))
         worker = subprocess.Popen(
-            [sys.executable, "-m", "tools.fuzz_worker", *numbers, folder, str(MEGABYTES)],
+            [sys.executable, "-m", module, *numbers, folder, str(MEGABYTES)],
             cwd=ROOT,
             pass_fds=[write],
             stdin=subprocess.DEVNULL,
@@ -113,10 +119,9 @@ def _turn(seed: int, first: int, end: int) -> Iterator[Result]:
         os.close(write)
         number = first
         try:
-            for line in _lines(read):
+            for line in _lines(read, seconds):
                 if line is None:
-                    worker.kill()
-                    yield Result(number, "FAILURE: too long", seconds=SECONDS)
+                    yield Result(number, "FAILURE: too long", seconds=seconds)
                     return
                 result = Result(*json.loads(line))
                 number = result.number + 1
@@ -133,10 +138,10 @@ def _turn(seed: int, first: int, end: int) -> Iterator[Result]:
             yield Result(number, f"FAILURE: {reason}", said)
 
 
-def _lines(descriptor: int) -> Iterator[bytes | None]:
+def _lines(descriptor: int, seconds: float) -> Iterator[bytes | None]:
     """Whole lines as they come; None where none has come for too long."""
     begun = b""
-    while select.select([descriptor], [], [], SECONDS)[0]:
+    while select.select([descriptor], [], [], seconds)[0]:
         new = os.read(descriptor, 1 << 16)
         if not new:
             return

@@ -43,6 +43,9 @@ COMPRESSIONS = (
     *("HTJ2K256", "HTJ2K32", "ZSTD"),
 )
 
+DATE = "2000:01:01 00:00:00"
+"""Else it is now, and no two runs are alike."""
+
 Writer = Callable[[Path], object]
 
 
@@ -108,6 +111,7 @@ def _write_mip_levels(path: Path, rounding: int) -> None:
     spec = oiio.ImageSpec(32, 16, 3, oiio.HALF)
     spec.tile_width = spec.tile_height = 8
     spec.attribute("textureformat", "Plain Texture")
+    spec.attribute("DateTime", DATE)
     spec.attribute("openexr:roundingmode", rounding)
     out = oiio.ImageOutput.create(str(path))
     out.open(str(path), spec)
@@ -147,6 +151,7 @@ def _deep(kind: OpenEXR.Storage) -> tuple[dict[str, np.ndarray], dict[str, objec
 def _write_chroma(path: Path) -> None:
     kind = Imath.PixelType(Imath.PixelType.FLOAT)
     header = OpenEXR.Header(32, 16)
+    header["compression"] = Imath.Compression(Imath.Compression.NO_COMPRESSION)
     header["channels"] = {
         "Y": Imath.Channel(kind),
         "RY": Imath.Channel(kind, 2, 2),
@@ -156,6 +161,9 @@ def _write_chroma(path: Path) -> None:
     chroma = np.zeros((8, 16), np.float32).tobytes()
     file.writePixels({"Y": PLANE.tobytes(), "RY": chroma, "BY": chroma})
     file.close()
+    # It reads on behind these bytes, and writes what happens to lie there.
+    content = path.read_bytes()
+    path.write_bytes(content[:-2048] + bytes(2048))
 
 
 def _windows_and_names() -> Iterator[tuple[str, Writer]]:
@@ -227,6 +235,7 @@ HEADS = {
 
 def _write_other(path: Path, kind: object, compression: str) -> None:
     spec = oiio.ImageSpec(32, 16, 3, kind)
+    spec.attribute("DateTime", DATE)
     if compression:
         spec.attribute("compression", compression)
     out = oiio.ImageOutput.create(str(path))

@@ -228,7 +228,7 @@ def change_structure(content: bytearray, random: Random, corpus: Sequence[bytes]
 
 def change_version(content: bytearray, random: Random, corpus: Sequence[bytes]) -> bytearray:
     """Tiles, long names, deep data and many parts are bits of the fifth to eighth byte."""
-    content[5] ^= random.choice((0x02, 0x04, 0x08, 0x10, 0x18, 0x0A, 0x01))
+    content[5] ^= random.choice((0x02, 0x04, 0x08, 0x10, 0x18, 0x0A, 0x1A, 0x01))
     return content
 
 

@@ -19,6 +19,12 @@ MAGIC = b"\x76\x2f\x31\x01"
 
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
+MOST_EMPTY = 256
+"""How many times as many pixels as are stored a frame may have: a damaged one promises anything."""
+
+LARGEST_TILE = 2**20
+"""Pixels of the largest tile that a small map is believed to have."""
+
 Header = dict[str, Any]
 Window = tuple[NDArray[np.int64], NDArray[np.int64]]
 """First and last pixel, each (x, y)."""
@@ -30,6 +36,8 @@ def read(path: Path) -> tuple[NDArray[np.floating], list[str]]:
     `exr_layers` says which channels are taken. Raises UnusableInput.
     """
     headers = _read_headers(path)
+    for part in headers:  # OpenEXR reads them all
+        _refuse_absurd(part, path.name)
     layer, warnings = choose_layer(headers, path.name)
     header = headers[layer.part]
     _check_map(header, path.name)
@@ -67,10 +75,22 @@ def _damaged(path: Path) -> UnusableInput:
     return UnusableInput(f"{path.name} is truncated or damaged: OpenEXR cannot read it.")
 
 
+def _refuse_absurd(header: Header, name: str) -> None:
+    """Raise UnusableInput for what would cost OpenEXR time and memory without end."""
+    width, height = _size(_window(header, "dataWindow"))
+    refuse_absurd_size(name, width, height)
+    tiles = header.get("tiles")
+    columns, rows = getattr(tiles, "xSize", 0), getattr(tiles, "ySize", 0)
+    # One tile may hold a whole map, with its sides rounded up to powers of two.
+    if columns * rows > max(LARGEST_TILE, 4 * width * height):
+        raise UnusableInput(
+            f"{name} is damaged or no map: its header promises tiles of {columns} x {rows} pixels."
+        )
+
+
 def _check_map(header: Header, name: str) -> None:
     import OpenEXR
 
-    refuse_absurd_size(name, *_size(_window(header, "dataWindow")))
     if header.get("envmap") == OpenEXR.ENVMAP_CUBE:
         raise UnusableInput(
             f"{name} states that it is a cube map: "
@@ -102,6 +122,9 @@ def _read_planes(path: Path, layer: Layer, header: Header) -> list[NDArray]:
     # OpenEXR leaves out what it could not read and says why in passing.
     if "MemoryError" in remarks.getvalue():
         raise too_large_for_memory(path.name, *size)
+    # OpenJPH guesses what is missing of a damaged block, and says so in passing as well.
+    if "ojph" in remarks.getvalue():
+        raise _damaged(path)
     planes = [found.get(name) for name in layer.channels]
     if any(plane is None or plane.shape != (size[1], size[0]) for plane in planes):
         raise _damaged(path)
@@ -130,7 +153,8 @@ def _in_display_window(
     if "envmap" in header or all(np.array_equal(a, b) for a, b in zip(data, display, strict=True)):
         return pixels, []
     width, height = _size(display)
-    if width != 2 * height or not 0 < width * height <= MAXIMUM_PIXELS:
+    most = min(MAXIMUM_PIXELS, MOST_EMPTY * pixels.shape[0] * pixels.shape[1])
+    if width != 2 * height or not 0 < width * height <= most:
         return pixels, ["The display window is no map: the data window is taken as the whole map."]
     whole = np.zeros((height, width, 3), pixels.dtype)
     first, last = np.maximum(data[0], display[0]), np.minimum(data[1], display[1])
@@ -152,7 +176,8 @@ def _moved(part: slice, origin: int) -> slice:
 
 def _colour_warnings(header: Header) -> list[str]:
     stated = header.get("chromaticities")
-    if stated is None or np.allclose(np.ravel(stated), REC709, atol=2e-3):
+    # Of another type than the format's, it states nothing that anyone would read.
+    if not isinstance(stated, tuple) or np.allclose(np.ravel(stated), REC709, atol=2e-3):
         return []
     return ["The file states primaries other than Rec.709; its numbers are taken as they are."]
 

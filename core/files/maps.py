@@ -16,13 +16,16 @@ def load(path: str | Path, allow_ldr: bool = False) -> EnvironmentMap:
     path = Path(path)
     magic, sha256 = _identify(path)
     warnings: list[str] = []
-    if magic == exr.MAGIC:
-        pixels, warnings = exr.read(path)
-    elif magic.startswith(radiance.MAGIC):
-        pixels = radiance.read(path)
-    else:
-        pixels = image.read(path, allow_ldr)
-    return environment_from_pixels(pixels, path.stem, path.name, sha256, tuple(warnings))
+    try:
+        if magic == exr.MAGIC:
+            pixels, warnings = exr.read(path)
+        elif magic.startswith(radiance.MAGIC):
+            pixels = radiance.read(path)
+        else:
+            pixels = image.read(path, allow_ldr)
+        return environment_from_pixels(pixels, path.stem, path.name, sha256, tuple(warnings))
+    except MemoryError as error:
+        raise UnusableInput(f"{path.name} does not fit into memory.") from error
 
 
 def _identify(path: Path) -> tuple[bytes, str]:
