@@ -47,7 +47,7 @@ def read_together(document: Path, read: Callable[[], Read]) -> Read:
 def read_named(file: Path, stated: str | None, by: str, read: Callable[[Path], Read]) -> Read:
     """What `read` makes of a file whose SHA-256 the document `by` states; older ones state none.
 
-    Raises NotTogether when it is missing or another one.
+    Raises NotTogether when it is missing or another one, UnusableInput when it cannot be read.
     """
     try:
         before = _identity(file)
@@ -56,6 +56,8 @@ def read_named(file: Path, stated: str | None, by: str, read: Callable[[Path], R
         same = same and _identity(file) == before  # else it was replaced under our eyes
     except FileNotFoundError as error:
         raise NotTogether(f"{file} is missing: convert the map again.") from error
+    except OSError as error:
+        raise UnusableInput(f"{file} cannot be read: {error.strerror}.") from error
     if not same:
         raise NotTogether(
             f"{file.name} was changed or is of another conversion than {by}: convert the map again."

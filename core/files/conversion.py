@@ -145,9 +145,8 @@ def _account(lights: Path) -> Account:
     document, suns, stated = lights_json.read(lights)
     residual = np.zeros(3)
     if stored := document["residual"]:
-        # Beside the document, whatever folders its name may hold.
-        file = lights.parent / Path(stored["file"]).name
-        pixels = read_named(file, stored.get("sha256"), lights.name, lambda path: exr.read(path)[0])
+        file, sum_of_file = lights_json.named_file(lights, stored)
+        pixels = read_named(file, sum_of_file, lights.name, lambda path: exr.read(path)[0])
         residual = scalar_irradiance(pixels.astype(np.float32))
     given = np.sum([sun.scalar_irradiance for sun in suns], axis=0) if suns else np.zeros(3)
     return Account(stated.source, given, residual)

@@ -37,7 +37,7 @@ def read(path: Path) -> tuple[NDArray[np.floating], list[str]]:
     """
     headers = _read_headers(path)
     for part in headers:  # OpenEXR reads them all
-        _refuse_absurd(part, path.name)
+        _refuse_absurd(part, path)
     layer, warnings = choose_layer(headers, path.name)
     header = headers[layer.part]
     _check_map(header, path.name)
@@ -75,16 +75,17 @@ def _damaged(path: Path) -> UnusableInput:
     return UnusableInput(f"{path.name} is truncated or damaged: OpenEXR cannot read it.")
 
 
-def _refuse_absurd(header: Header, name: str) -> None:
+def _refuse_absurd(header: Header, path: Path) -> None:
     """Raise UnusableInput for what would cost OpenEXR time and memory without end."""
     width, height = _size(_window(header, "dataWindow"))
-    refuse_absurd_size(name, width, height)
+    refuse_absurd_size(path.name, width, height, path.stat().st_size)
     tiles = header.get("tiles")
     columns, rows = getattr(tiles, "xSize", 0), getattr(tiles, "ySize", 0)
     # One tile may hold a whole map, with its sides rounded up to powers of two.
     if columns * rows > max(LARGEST_TILE, 4 * width * height):
         raise UnusableInput(
-            f"{name} is damaged or no map: its header promises tiles of {columns} x {rows} pixels."
+            f"{path.name} is damaged or no map: its header promises tiles of {columns} x {rows} "
+            "pixels."
         )
 
 

@@ -25,7 +25,7 @@ def read(path: Path, allow_ldr: bool, upright: bool = True) -> NDArray[np.float3
     with quiet_libraries():
         source = _open(path)
         try:
-            linear = _check(source, path.name, allow_ldr)
+            linear = _check(source, path, allow_ldr)
             pixels = _read_pixels(source, path.name)
             spec = source.spec()
         finally:
@@ -57,16 +57,16 @@ def _open(path: Path) -> ImageInput:
     return source
 
 
-def _check(source: ImageInput, name: str, allow_ldr: bool) -> bool:
+def _check(source: ImageInput, path: Path, allow_ldr: bool) -> bool:
     """Whether an image holds linear light. Raises UnusableInput for one that must not be read."""
     import OpenImageIO as oiio
 
     spec = source.spec()
-    refuse_absurd_size(name, spec.width, spec.height)
+    refuse_absurd_size(path.name, spec.width, spec.height, path.stat().st_size)
     linear = spec.format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
     if not linear and not allow_ldr:
         raise UnusableInput(
-            f"{name} is an LDR image ({spec.format} values, no linear light): use the "
+            f"{path.name} is an LDR image ({spec.format} values, no linear light): use the "
             "HDR version of the map, or --allow-ldr to take it as sRGB."
         )
     return linear

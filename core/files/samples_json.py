@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import sphere
 from ..errors import UnusableInput
 from ..samples import MapOfSamples
 from . import exr
 from .belonging import read_named, read_together
-from .lights_json import AXES, read_document
+from .lights_json import AXES, DAMAGE, named_file, numbers, read_document
 
 FORMAT = "sunsplit.samples"
 VERSION = 1
@@ -53,21 +52,15 @@ def _read(path: Path) -> MapOfSamples:
     document = read_document(path, FORMAT, VERSION)
     try:
         samples = document["samples"]
-        sites = _numbers(samples, "to_light").reshape(len(samples), 3)
-        flux = _numbers(samples, "scalar_irradiance").reshape(len(samples), 3)
-        area = _numbers(samples, "area").reshape(len(samples))
-        # Beside the list, whatever folders its name may hold.
-        image = path.parent / Path(document["map"]["file"]).name
+        sites = numbers([entry["to_light"] for entry in samples], len(samples), 3)
+        flux = numbers([entry["scalar_irradiance"] for entry in samples], len(samples), 3)
+        area = numbers([entry["area"] for entry in samples], len(samples))
+        image, stated = named_file(path, document["map"])
         shape = int(document["map"]["height"]), int(document["map"]["width"]), 3
-        stated = document["map"].get("sha256")
-    except (KeyError, TypeError, ValueError) as error:
+    except DAMAGE as error:
         raise UnusableInput(f"{path.name} is damaged: {error!r}.") from error
     radiance = read_named(image, stated, path.name, lambda file: exr.read(file)[0])
     radiance = radiance.astype(np.float32)
     if radiance.shape != shape:
         raise UnusableInput(f"{image.name} is another map than {path.name} says.")
     return MapOfSamples(sites, flux, area, radiance)
-
-
-def _numbers(samples: list[dict[str, object]], name: str) -> NDArray[np.float64]:
-    return np.array([entry[name] for entry in samples], dtype=np.float64)

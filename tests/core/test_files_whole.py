@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import errno
 import json
 import os
@@ -289,3 +290,53 @@ def test_a_folder_that_one_may_not_write_into(saver):
             "Nothing was changed."
         )
         assert lights_json.read(folder / "map.lights.json")[0]["residual"]["sha256"]
+
+
+def spoilt(document, value):
+    """Copies of a document, each with another of its parts replaced by a value."""
+    for key in document if isinstance(document, dict) else range(len(document)):
+        other = copy.copy(document)
+        other[key] = value
+        yield other
+        if isinstance(document[key], (dict, list)):
+            for part in spoilt(document[key], value):
+                other = copy.copy(document)
+                other[key] = part
+                yield other
+
+
+@pytest.mark.parametrize(
+    "value", [None, [], {}, "", "a\0b", "..", "../x", -1, float("inf"), float("nan"), 10**400]
+)
+@pytest.mark.parametrize("name", ["lights", "samples"])
+def test_spoilt_documents_are_read_or_one_sentence(tmp_path, saver, name, value):
+    saved(saver, tmp_path / "a", "voronoi")
+    path = tmp_path / "a" / f"map.{name}.json"
+    read = account_of_files if name == "lights" else read_samples
+    document = json.loads(path.read_text())
+    if name == "samples":
+        document["samples"] = document["samples"][:2]
+    said = []
+    for other in spoilt(document, value):
+        path.write_text(json.dumps(other))
+        try:
+            read(path)
+        except UnusableInput as error:
+            said.append(str(error))
+    assert len(said) > 10
+    assert not any("\n" in sentence for sentence in said)
+
+
+def test_a_residual_that_is_a_folder_is_one_sentence(tmp_path, saver):
+    saved(saver, tmp_path / "a", "map")
+    (tmp_path / "a" / "map.residual.exr").unlink()
+    (tmp_path / "a" / "map.residual.exr").mkdir()
+    with pytest.raises(UnusableInput, match=r"map\.residual\.exr cannot be read: Is a directory"):
+        account_of_files(tmp_path / "a" / "map.lights.json")
+
+
+def test_a_document_nested_without_end_is_one_sentence(tmp_path):
+    path = tmp_path / "map.lights.json"
+    path.write_text("[" * 100_000)
+    with pytest.raises(UnusableInput, match="not readable JSON"):
+        lights_json.read(path)
