@@ -61,7 +61,8 @@ def main() -> int:
     results = []
     with tempfile.TemporaryDirectory() as folder:
         corpus = valid_files(Path(folder))
-        for result in fuzz(options.seed, options.first, options.first + options.count):
+        end = options.first + options.count
+        for result in fuzz(options.seed, options.first, end, megabytes=options.megabytes):
             results.append(result)
             if result.is_failure:
                 _keep(result, mutated(corpus, options.seed, result.number), options)
@@ -75,20 +76,28 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--count", type=int, default=100_000)
     parser.add_argument("--first", type=int, default=0, help="number of the first file")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--megabytes", type=int, default=MEGABYTES, help="for each worker")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for failures")
     return parser.parse_args()
 
 
 def fuzz(
-    seed: int, first: int, end: int, worker: str = "tools.fuzz_worker", seconds: float = SECONDS
+    seed: int,
+    first: int,
+    end: int,
+    worker: str = "tools.fuzz_worker",
+    seconds: float = SECONDS,
+    megabytes: int = MEGABYTES,
 ) -> Iterator[Result]:
     """Results of the files from `first` to before `end`, in order, one process at a time.
 
     worker: the module that reads them. seconds: that it may take for each, starting up included.
+    megabytes: that it may have more than at its start.
     Raises RuntimeError when it does not start.
     """
     while first < end:
-        for result in _turn(seed, first, min(first + TURN, end), worker, seconds):
+        numbers = range(first, min(first + TURN, end))
+        for result in _turn(seed, numbers, [sys.executable, "-m", worker], seconds, megabytes):
             yield result
             first = result.number + 1
 
@@ -98,18 +107,21 @@ def table(results: list[Result]) -> str:
     counts = Counter(result.outcome for result in results)
     lines = [f"{count:8,d}  {outcome}" for outcome, count in counts.most_common()]
     slowest = max(results, key=lambda result: result.seconds)
-    peak = max(result.peak for result in results)
-    lines.append(f"slowest: file {slowest.number}, {slowest.seconds:.2f} s; memory: {peak} MB")
+    largest = max(results, key=lambda result: result.peak)
+    lines.append(f"slowest: file {slowest.number}, {slowest.seconds:.2f} s")
+    lines.append(f"most memory: file {largest.number}, {largest.peak} MB")
     return "\n".join(lines)
 
 
-def _turn(seed: int, first: int, end: int, module: str, seconds: float) -> Iterator[Result]:
+def _turn(
+    seed: int, files: range, command: list[str], seconds: float, megabytes: int
+) -> Iterator[Result]:
     """Results until the worker has ended, whether well or not."""
     with tempfile.TemporaryDirectory() as folder:
         read, write = os.pipe()
-        numbers = map(str, (seed, first, end, write))
+        numbers = map(str, (seed, files.start, files.stop, write))
         worker = subprocess.Popen(
-            [sys.executable, "-m", module, *numbers, folder, str(MEGABYTES)],
+            [*command, *numbers, folder, str(megabytes)],
             cwd=ROOT,
             pass_fds=[write],
             stdin=subprocess.DEVNULL,
@@ -117,7 +129,7 @@ def _turn(seed: int, first: int, end: int, module: str, seconds: float) -> Itera
             text=True,
         )
         os.close(write)
-        number = first
+        number = files.start
         try:
             for line in _lines(read, seconds):
                 if line is None:
@@ -131,9 +143,9 @@ def _turn(seed: int, first: int, end: int, module: str, seconds: float) -> Itera
             os.close(read)
             worker.kill()
             _, said = worker.communicate()
-        if number == first and status > 0:
+        if number == files.start and status > 0:
             raise RuntimeError(f"the worker did not start:\n{said}")
-        if number < end:
+        if number in files:
             reason = signal.Signals(-status).name if status < 0 else f"exit status {status}"
             yield Result(number, f"FAILURE: {reason}", said)
 

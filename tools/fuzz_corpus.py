@@ -55,8 +55,9 @@ def valid_files(folder: Path) -> list[bytes]:
     for name, write in writers():
         path = folder / name
         write(path)
-        found.append(path.read_bytes())
-        path.unlink()
+        if path.exists():
+            found.append(path.read_bytes())
+            path.unlink()
     return found
 
 
@@ -234,11 +235,14 @@ HEADS = {
 
 
 def _write_other(path: Path, kind: object, compression: str) -> None:
+    out = oiio.ImageOutput.create(str(path))
+    if out is None:  # a format that this version of it does not know
+        oiio.geterror()
+        return
     spec = oiio.ImageSpec(32, 16, 3, kind)
     spec.attribute("DateTime", DATE)
     if compression:
         spec.attribute("compression", compression)
-    out = oiio.ImageOutput.create(str(path))
     out.open(str(path), spec)
     out.write_image(PIXELS)
     out.close()

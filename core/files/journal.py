@@ -60,7 +60,11 @@ def begin(folder: Path) -> Writer:
     """A new writer. To be called `alone`: others would take it for a dead one. Raises OSError."""
     own = folder / HIDDEN / secrets.token_hex(8)
     own.mkdir()
-    alive = lock.take(own / ALIVE)
+    try:
+        alive = lock.take(own / ALIVE)
+    except OSError:
+        _remove(own)
+        raise
     if alive is None:
         raise RuntimeError(f"{own} is new, and yet another one's")
     return Writer(own, alive)
@@ -88,16 +92,23 @@ def finish_others(folder: Path) -> None:
     Raises OSError where their names can be neither taken nor given back.
     """
     for own in _folders(folder / HIDDEN):
-        alive = lock.take(own / ALIVE, without=False)
+        try:
+            alive = lock.take(own / ALIVE, without=False)
+        except OSError:  # it has just gone, or is another user's
+            continue
         if alive is not None:
-            try:
-                # If the new files cannot have the names, the older ones have them again.
-                with suppress(OSError):
-                    _carry_out(own)
-                if is_pending(own):
-                    raise OSError(None, f"what was begun in {own} cannot be finished")
-            finally:
-                Writer(own, alive).close()
+            _finish(Writer(own, alive))
+
+
+def _finish(dead: Writer) -> None:
+    try:
+        # If the new files cannot have the names, the older ones have them again.
+        with suppress(OSError):
+            _carry_out(dead.own)
+        if is_pending(dead.own):
+            raise OSError(None, f"what was begun in {dead.own} cannot be finished")
+    finally:
+        dead.close()
 
 
 def is_pending(own: Path) -> bool:

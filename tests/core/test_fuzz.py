@@ -16,7 +16,7 @@ from sunsplit.core.files.maps import load
 from tests.dying_worker import CRASHES, HANGS, LEAVES
 from tests.files import noise, radiance_head, sunny, sunsplit, window, write_exr
 from tools.fuzz import fuzz
-from tools.fuzz_corpus import valid_files, writers
+from tools.fuzz_corpus import valid_files
 from tools.fuzz_mutations import attributes, mutated
 
 PIXELS = noise()
@@ -44,7 +44,7 @@ def test_a_crash_a_hang_and_an_exit_are_seen():
 
 def test_a_seed_makes_the_same_files(tmp_path):
     corpus = valid_files(tmp_path)
-    assert len(corpus) == len(list(writers())) > 90
+    assert len(corpus) > 90
     files = [mutated(corpus, 5, number) for number in range(300)]
     again = valid_files(tmp_path)
     assert files == [mutated(again, 5, number) for number in range(300)]
