@@ -7,6 +7,7 @@ every folder that is made or removed, as Python's audit hooks tell.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import resource
@@ -40,7 +41,10 @@ class Saver:
         )
 
     def start(self, folder: Path, variant: str, **order: object) -> None:
-        """Begin to save. preview, times (1), kill_at, user (id), file_size (most bytes)."""
+        """Begin to save.
+
+        order: preview, times (1), kill_at, no_links, user (id), file_size (most bytes).
+        """
         order |= {"folder": str(folder), "variant": variant}
         self.process.stdin.write(json.dumps(order) + "\n")
         self.process.stdin.flush()
@@ -103,6 +107,8 @@ def _obey(order: dict, conversion: object, write: int) -> None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
         if user := order.get("user"):
             os.setuid(user)
+        if order.get("no_links"):
+            sys.addaudithook(_refuse_links)
         if (event := order.get("kill_at")) is not None:
             _kill_at(event, order["folder"])
         for _ in range(order.get("times", 1)):
@@ -111,6 +117,12 @@ def _obey(order: dict, conversion: object, write: int) -> None:
         status = 1
         os.write(write, f"{type(error).__name__}: {error}".encode())
     os._exit(status)
+
+
+def _refuse_links(event: str, arguments: tuple) -> None:
+    """As FAT does, and some network drives."""
+    if event == "os.link":
+        raise PermissionError(errno.EPERM, "Operation not permitted")
 
 
 def _kill_at(number: int, folder: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import errno
+import itertools
 import json
 import os
 import shutil
@@ -43,24 +44,25 @@ def saved(saver, folder, variant, **order):
     return files(folder)
 
 
+@pytest.mark.parametrize("order", [{}, {"no_links": True}], ids=["links", "no links"])
 @pytest.mark.parametrize(
     ("older", "newer"), [("map", "voronoi"), ("voronoi", "none"), ("none", "map")]
 )
-def test_killed_at_any_moment_leaves_old_or_new(tmp_path, saver, older, newer):
+def test_killed_at_any_moment_leaves_old_or_new(tmp_path, saver, older, newer, order):
     old = saved(saver, tmp_path / "old", older, preview=True)
     new = saved(saver, tmp_path / "new", newer)
     states, torn, status = [], 0, -signal.SIGKILL
     while status == -signal.SIGKILL:
         folder = tmp_path / f"killed at {len(states)}"
         shutil.copytree(tmp_path / "old", folder)
-        status, error = saver.save(folder, newer, kill_at=len(states))
+        status, error = saver.save(folder, newer, kill_at=len(states), **order)
         seen = files(folder)
         assert all(content in (old.get(n), new.get(n)) for n, content in seen.items())
+        # Where an older file keeps its name until the new one has it, none is ever missing.
+        assert "no_links" in order or set(seen) >= set(old) & set(new)
         torn += seen not in (old, new)
-        account_of_files(folder / "map.lights.json")
-        states.append(files(folder))
+        states.append(mended(folder))
         assert states[-1] in (old, new)
-        assert not (folder / journal.HIDDEN).exists()
         assert saver.save(folder, newer) == (0, "")
         assert files(folder) == new
     assert (status, error) == (0, "")
@@ -68,6 +70,31 @@ def test_killed_at_any_moment_leaves_old_or_new(tmp_path, saver, older, newer):
     assert states[-1] == new
     assert states == sorted(states, key=lambda state: state == new)
     assert torn > 0  # else nothing had to be mended
+
+
+def mended(folder):
+    """Names and bytes in a folder once its conversion has been read."""
+    account_of_files(folder / "map.lights.json")
+    assert not (folder / journal.HIDDEN).exists()
+    return files(folder)
+
+
+def test_killed_while_giving_names_back_leaves_old_or_new(tmp_path, saver):
+    old = saved(saver, tmp_path / "old", "map")
+    new = saved(saver, tmp_path / "new", "voronoi")
+    undone, status = 0, -signal.SIGKILL
+    for event in itertools.count():
+        folder = tmp_path / f"killed at {event}"
+        shutil.copytree(tmp_path / "old", folder)
+        with unchangeable(folder / "map.lights.json"):
+            status, error = saver.save(folder, "voronoi", kill_at=event)
+        undone += any((folder / journal.HIDDEN).glob(f"*/{journal.BACK}"))
+        assert mended(folder) in (old, new)
+        if status != -signal.SIGKILL:
+            break
+    assert (status, files(folder)) == (1, old)
+    assert error.endswith("Operation not permitted. Nothing was changed.")
+    assert undone > 2
 
 
 def test_the_next_writer_finishes_too(tmp_path, saver):
