@@ -6,6 +6,7 @@ They are written anew each time and are alike each time; nothing of them is kept
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import chdir
 from pathlib import Path
 
 import Imath
@@ -52,12 +53,13 @@ Writer = Callable[[Path], object]
 def valid_files(folder: Path) -> list[bytes]:
     """The bytes of all files; written into a folder that is there."""
     found = []
-    for name, write in writers():
-        path = folder / name
-        write(path)
-        if path.exists():
-            found.append(path.read_bytes())
-            path.unlink()
+    with chdir(folder):  # some files say how they were called
+        for name, write in writers():
+            path = Path(name)
+            write(path)
+            if path.exists():
+                found.append(path.read_bytes())
+                path.unlink()
     return found
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..errors import UnusableInput
 from .limits import refuse_absurd_size, too_large_for_memory
 from .quiet import quiet_libraries
+from .tiff import is_zip_whole
 
 if TYPE_CHECKING:
     from OpenImageIO import ImageInput
@@ -26,7 +27,7 @@ def read(path: Path, allow_ldr: bool, upright: bool = True) -> NDArray[np.float3
         source = _open(path)
         try:
             linear = _check(source, path, allow_ldr)
-            pixels = _read_pixels(source, path.name)
+            pixels = _read_pixels(source, path)
             spec = source.spec()
         finally:
             source.close()
@@ -72,19 +73,26 @@ def _check(source: ImageInput, path: Path, allow_ldr: bool) -> bool:
     return linear
 
 
-def _read_pixels(source: ImageInput, name: str) -> NDArray[np.float32]:
+def _read_pixels(source: ImageInput, path: Path) -> NDArray[np.float32]:
     import OpenImageIO as oiio
 
     spec = source.spec()
     try:
         pixels = source.read_image(oiio.FLOAT)
     except MemoryError as error:
-        raise too_large_for_memory(name, spec.width, spec.height) from error
+        raise too_large_for_memory(path.name, spec.width, spec.height) from error
     problem = source.geterror()
+    if _is_zip(source) and not is_zip_whole(path):
+        pixels = None
     if pixels is None or problem:
         reason = (problem.splitlines() or ["its pixels end too early"])[0].strip()
-        raise UnusableInput(f"{name} is truncated or damaged ({reason}).")
+        raise UnusableInput(f"{path.name} is truncated or damaged ({reason}).")
     return pixels
+
+
+def _is_zip(source: ImageInput) -> bool:
+    is_tiff = source.format_name() == "tiff"
+    return is_tiff and "zip" in (source.spec().getattribute("compression") or "")
 
 
 def _upright(pixels: NDArray[np.float32], orientation: int) -> NDArray[np.float32]:

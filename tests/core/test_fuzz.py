@@ -5,11 +5,14 @@ from __future__ import annotations
 import ctypes
 import resource
 import struct
+import zlib
 from collections import Counter
 
 import numpy as np
 import OpenEXR
+import OpenImageIO as oiio
 import pytest
+import tifffile
 
 from sunsplit.core.errors import UnusableInput
 from sunsplit.core.files.maps import load
@@ -162,3 +165,57 @@ def test_what_does_not_fit_into_memory_is_one_sentence(tmp_path):
     ended = sunsplit("info", path, preexec_fn=with_little_memory)
     assert (ended.returncode, ended.stdout) == (1, "")
     assert ended.stderr == "sunsplit: map.hdr does not fit into memory.\n"
+
+
+def write_tiff(path, packed, **spec):
+    """A float TIFF of PIXELS, as OpenImageIO packs it."""
+    kind = oiio.ImageSpec(32, 16, 3, oiio.FLOAT)
+    kind.attribute("compression", packed)
+    kind.tile_width = kind.tile_height = spec.get("tile", 0)
+    out = oiio.ImageOutput.create(str(path))
+    assert out.open(str(path), kind)
+    assert out.write_image(PIXELS)
+    out.close()
+    return path
+
+
+@pytest.mark.parametrize("tile", [0, 16])
+@pytest.mark.parametrize("packed", ["zip", "lzw", "none"])
+def test_tiffs_of_every_packing_are_read(tmp_path, packed, tile):
+    assert (load(write_tiff(tmp_path / "map.tif", packed, tile=tile)).radiance == PIXELS).all()
+
+
+@pytest.mark.parametrize("order", "<>")
+@pytest.mark.parametrize("big", [False, True])
+def test_tiffs_of_another_program_are_read(tmp_path, order, big):
+    path = tmp_path / "map.tif"
+    options = {"bigtiff": big, "byteorder": order, "compression": "zlib", "rowsperstrip": 5}
+    tifffile.imwrite(path, PIXELS, photometric="rgb", **options)
+    assert (load(path).radiance == PIXELS).all()
+    tifffile.imwrite(path, np.full((16, 32), 255, np.uint8), **options)
+    assert load(path, allow_ldr=True).radiance.min() == 1
+
+
+@pytest.mark.parametrize("tile", [0, 16])
+def test_a_damaged_zip_in_a_tiff_is_not_passed_on_as_light(tmp_path, tile):
+    path = write_tiff(tmp_path / "map.tif", "zip", tile=tile)
+    content = bytearray(path.read_bytes())
+    with tifffile.TiffFile(path) as file:
+        content[file.pages[0].dataoffsets[0] + 40] ^= 0x10
+    path.write_bytes(content)
+    with pytest.raises(UnusableInput, match="truncated or damaged"):
+        load(path)
+
+
+def test_a_zip_in_a_tiff_that_is_too_short_is_not_passed_on_as_light(tmp_path):
+    path = tmp_path / "map.tif"
+    tifffile.imwrite(path, PIXELS, photometric="rgb", compression="zlib")
+    assert (load(path).radiance == PIXELS).all()
+    content = path.read_bytes()
+    packed = zlib.compress(PIXELS.tobytes(), 6)
+    start = content.index(packed[:2], 8)
+    short = zlib.compress(PIXELS[:9].tobytes())
+    assert len(short) < len(content) - start
+    path.write_bytes(content[:start] + short.ljust(len(content) - start, b"\0"))
+    with pytest.raises(UnusableInput, match="truncated or damaged"):
+        load(path)
