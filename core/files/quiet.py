@@ -11,7 +11,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TextIO
 
 STDOUT, STDERR = 1, 2
 
@@ -31,7 +31,12 @@ def quiet_libraries() -> Iterator[io.StringIO]:
     """
     with _one_at_a_time, redirect_stdout(io.StringIO()) as remarks, _scratch_file() as printed:
         _flush_c()
-        with _redirected(STDOUT, printed), _redirected(STDERR, printed):
+        if sys.stderr:
+            sys.stderr.flush()
+        with (
+            _redirected(STDOUT, sys.__stdout__, printed),
+            _redirected(STDERR, sys.__stderr__, printed),
+        ):
             try:
                 yield remarks
             finally:
@@ -54,12 +59,16 @@ def _flush_c() -> None:
 
 
 @contextmanager
-def _redirected(descriptor: int, file: BinaryIO) -> Iterator[None]:
-    if sys.stderr:
-        sys.stderr.flush()
+def _redirected(descriptor: int, own: TextIO | None, file: BinaryIO) -> Iterator[None]:
+    """What is printed on a descriptor goes into a file. own: what Python has on it, if anything.
+
+    Where it was closed from the beginning, its number may by now be that of a map being read.
+    """
     try:
-        kept = os.dup(descriptor)
-    except OSError:  # it is closed: there is nothing to keep quiet
+        kept = os.dup(descriptor) if own else None
+    except OSError:
+        kept = None
+    if kept is None:
         yield
         return
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import resource
 import struct
 import zlib
@@ -17,7 +18,7 @@ import tifffile
 from sunsplit.core.errors import UnusableInput
 from sunsplit.core.files.maps import load
 from tests.dying_worker import CRASHES, HANGS, LEAVES
-from tests.files import noise, radiance_head, sunny, sunsplit, window, write_exr
+from tests.files import noise, radiance_head, sunny, sunsplit, window, write_exr, write_hdr
 from tools.fuzz import fuzz
 from tools.fuzz_corpus import valid_files
 from tools.fuzz_mutations import attributes, mutated
@@ -219,3 +220,17 @@ def test_a_zip_in_a_tiff_that_is_too_short_is_not_passed_on_as_light(tmp_path):
     path.write_bytes(content[:start] + short.ljust(len(content) - start, b"\0"))
     with pytest.raises(UnusableInput, match="truncated or damaged"):
         load(path)
+
+
+@pytest.mark.parametrize("closed", [(1,), (2,), (1, 2), (0, 1, 2)])
+@pytest.mark.parametrize("kind", ["exr", "hdr"])
+def test_a_map_is_read_where_nothing_can_be_printed(tmp_path, kind, closed):
+    """The map's own file may then have the number of stdout or stderr."""
+    path = tmp_path / f"map.{kind}"
+    (write_exr if kind == "exr" else write_hdr)(path, sunny())
+
+    def close():
+        for descriptor in closed:
+            os.close(descriptor)
+
+    assert sunsplit("info", path, preexec_fn=close).returncode == 0
