@@ -13,6 +13,7 @@ CRASHES, HANGS, LEAVES = 2, 4, 6
 
 def main() -> None:
     first, end, descriptor = map(int, sys.argv[2:5])
+    os.write(descriptor, b"ready\n")
     for number in range(first, end):
         if number == CRASHES:
             ctypes.string_at(0)

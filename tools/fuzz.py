@@ -29,8 +29,8 @@ from tools.fuzz_mutations import mutated
 
 ROOT = Path(__file__).resolve().parent.parent
 
-SECONDS = 20
-"""That a file may take. On a busy machine starting up takes a part of it."""
+SECONDS, STARTING = 20, 120
+"""That a file may take, and a worker to start on a busy machine."""
 
 MEGABYTES = 2048
 """That a worker may have more than at its start."""
@@ -91,7 +91,7 @@ def fuzz(
 ) -> Iterator[Result]:
     """Results of the files from `first` to before `end`, in order, one process at a time.
 
-    worker: the module that reads them. seconds: that it may take for each, starting up included.
+    worker: the module that reads them. seconds: that it may take for each.
     megabytes: that it may have more than at its start.
     Raises RuntimeError when it does not start.
     """
@@ -131,19 +131,21 @@ def _turn(
         os.close(write)
         number = files.start
         try:
-            for line in _lines(read, seconds):
+            lines = _lines(read, seconds)
+            started = next(lines, None) is not None
+            for line in lines if started else ():
                 if line is None:
                     yield Result(number, "FAILURE: too long", seconds=seconds)
                     return
                 result = Result(*json.loads(line))
                 number = result.number + 1
                 yield result
-            status = worker.wait()
+            status = worker.wait(STARTING)
         finally:
             os.close(read)
             worker.kill()
             _, said = worker.communicate()
-        if number == files.start and status > 0:
+        if not started:
             raise RuntimeError(f"the worker did not start:\n{said}")
         if number in files:
             reason = signal.Signals(-status).name if status < 0 else f"exit status {status}"
@@ -151,9 +153,10 @@ def _turn(
 
 
 def _lines(descriptor: int, seconds: float) -> Iterator[bytes | None]:
-    """Whole lines as they come; None where none has come for too long."""
-    begun = b""
-    while select.select([descriptor], [], [], seconds)[0]:
+    """Whole lines as they come, the first of which may take longer; None where none has come."""
+    begun, patience = b"", float(STARTING)
+    while select.select([descriptor], [], [], patience)[0]:
+        patience = seconds
         new = os.read(descriptor, 1 << 16)
         if not new:
             return

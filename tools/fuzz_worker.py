@@ -23,6 +23,9 @@ SLOW = 6.0
 """Seconds of the processor for a small file that are too many. Repeating one pixel until it fills a
 map of 8k takes 4."""
 
+READY = "ready"
+"""The first line: from here on time counts."""
+
 LONGEST = 400
 """Characters of a sentence that one can still call a sentence."""
 
@@ -37,6 +40,7 @@ def main() -> None:
     _redirect_to(said)
     path = folder / "map.any"
     with os.fdopen(descriptor, "w") as reports:
+        print(READY, file=reports, flush=True)
         for number in range(first, end):
             path.write_bytes(mutated(corpus, seed, number))
             start = time.process_time()
