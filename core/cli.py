@@ -27,7 +27,6 @@ from .progress import Progress, terminal_progress
 from .settings import BadSetting
 
 if TYPE_CHECKING:  # imported where they are used: `--help` must not wait for scipy
-    from .conversion import Conversion
     from .files.conversion import WrittenFiles
 
 WRONG_USAGE = 2
@@ -176,7 +175,7 @@ def run_convert(options: argparse.Namespace) -> int:
         files = save(conversion, options.output, options.preview)
     try:
         if options.json:
-            _print_json(conversion, files)
+            _print_json(files)
         else:
             print("\n".join(conversion_lines(conversion, files)))
     except KeyboardInterrupt:
@@ -225,8 +224,8 @@ def _within(progress: Progress, start: float, end: float) -> Progress:
     return lambda stage, fraction: progress(stage, start + (end - start) * fraction)
 
 
-def _print_json(conversion: Conversion, files: WrittenFiles) -> None:
-    from .files.conversion import describe
+def _print_json(files: WrittenFiles) -> None:
+    from .files import lights_json
 
     paths = {
         kind: str(path) if path else None
@@ -237,4 +236,7 @@ def _print_json(conversion: Conversion, files: WrittenFiles) -> None:
             ("preview", files.preview),
         )
     }
-    print(json.dumps(describe(conversion) | {"files": paths}))
+    document, _, _ = lights_json.read(files.lights)
+    for name in ("format", "version", "axes"):
+        del document[name]
+    print(json.dumps(document | {"files": paths}))

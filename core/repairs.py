@@ -71,7 +71,8 @@ def repair_planes(
     infinite = np.isposinf(planes)
     negative = planes < 0
     own = slice(halo[0], planes.shape[1] - halo[1])
-    lost = np.where(np.isfinite(planes) & negative, -planes.astype(np.float64), 0.0)
+    # Widened last: to widen a signalling NaN is an invalid operation.
+    lost = -np.where(np.isfinite(planes) & negative, planes, 0).astype(np.float64)
     planes[negative] = 0
     for channel in range(3):
         planes[channel][infinite[channel]] = max(highest[channel], HALF_MAXIMUM)

@@ -31,6 +31,7 @@ def conversion_lines(conversion: Conversion, files: WrittenFiles) -> list[str]:
         *_sun_lines(conversion),
         _account_line(conversion, files),
         *(f"wrote {path}" for path in paths if path),
+        *(f"removed {path}, which was of an older conversion" for path in files.removed),
     ]
 
 

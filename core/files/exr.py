@@ -19,7 +19,6 @@ from . import image
 from .exr_layers import Channel, Layer, choose_layer
 from .limits import (
     MAXIMUM_PIXELS,
-    cannot_write,
     damaged_exr,
     refuse_absurd_size,
     too_large_for_memory,
@@ -30,6 +29,12 @@ from .strips import ExrPixels
 MAGIC = b"\x76\x2f\x31\x01"
 
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+
+MOST_EMPTY = 256
+"""How many times as many pixels as are stored a frame may have: a damaged one promises anything."""
+
+LARGEST_TILE = 2**20
+"""Pixels of the largest tile that a small map is believed to have."""
 
 Header = dict[str, Any]
 Window = tuple[NDArray[np.int64], NDArray[np.int64]]
@@ -43,6 +48,8 @@ def read(path: Path) -> tuple[Pixels, list[str]]:
     `exr_layers` says which channels are taken. Raises UnusableInput.
     """
     headers = _read_headers(path)
+    for part in headers:  # OpenEXR reads them all
+        _refuse_absurd(part, path)
     layer, warnings = choose_layer(headers, path.name)
     header = headers[layer.part]
     _check_map(header, path.name)
@@ -91,10 +98,23 @@ def _plain(header: Header) -> Header:
     return header | {"channels": channels}
 
 
+def _refuse_absurd(header: Header, path: Path) -> None:
+    """Raise UnusableInput for what would cost OpenEXR time and memory without end."""
+    width, height = _size(_window(header, "dataWindow"))
+    refuse_absurd_size(path.name, width, height, path.stat().st_size)
+    tiles = header.get("tiles")
+    columns, rows = getattr(tiles, "xSize", 0), getattr(tiles, "ySize", 0)
+    # One tile may hold a whole map, with its sides rounded up to powers of two.
+    if columns * rows > max(LARGEST_TILE, 4 * width * height):
+        raise UnusableInput(
+            f"{path.name} is damaged or no map: its header promises tiles of {columns} x {rows} "
+            "pixels."
+        )
+
+
 def _check_map(header: Header, name: str) -> None:
     import OpenEXR
 
-    refuse_absurd_size(name, *_size(_window(header, "dataWindow")))
     if header.get("envmap") == OpenEXR.ENVMAP_CUBE:
         raise UnusableInput(
             f"{name} states that it is a cube map: "
@@ -126,6 +146,9 @@ def _read_planes(path: Path, layer: Layer, header: Header) -> Strip:
     # OpenEXR leaves out what it could not read and says why in passing.
     if "MemoryError" in remarks.getvalue():
         raise too_large_for_memory(path.name, *size)
+    # OpenJPH guesses what is missing of a damaged block, and says so in passing as well.
+    if "ojph" in remarks.getvalue():
+        raise damaged_exr(path.name)
     planes = tuple(found.get(name) for name in layer.channels)
     if any(plane is None or plane.shape != (size[1], size[0]) for plane in planes):
         raise damaged_exr(path.name)
@@ -152,7 +175,8 @@ def _in_display_window(planes: Strip, header: Header) -> tuple[Strip, list[str]]
     if "envmap" in header or all(np.array_equal(a, b) for a, b in zip(data, display, strict=True)):
         return planes, []
     width, height = _size(display)
-    if width != 2 * height or not 0 < width * height <= MAXIMUM_PIXELS:
+    most = min(MAXIMUM_PIXELS, MOST_EMPTY * planes[0].size)
+    if width != 2 * height or not 0 < width * height <= most:
         return planes, ["The display window is no map: the data window is taken as the whole map."]
     whole = tuple(np.zeros((height, width), plane.dtype) for plane in planes)
     first, last = np.maximum(data[0], display[0]), np.minimum(data[1], display[1])
@@ -174,7 +198,8 @@ def _moved(part: slice, origin: int) -> slice:
 
 def _colour_warnings(header: Header) -> list[str]:
     stated = header.get("chromaticities")
-    if stated is None or np.allclose(np.ravel(stated), REC709, atol=2e-3):
+    # Of another type than the format's, it states nothing that anyone would read.
+    if not isinstance(stated, tuple) or np.allclose(np.ravel(stated), REC709, atol=2e-3):
         return []
     return ["The file states primaries other than Rec.709; its numbers are taken as they are."]
 
@@ -194,7 +219,7 @@ def write(path: Path, radiance: NDArray[np.float32], compressed: bool = True) ->
 
     radiance: (height, width, 3), linear Rec.709. compressed: without loss, which takes most of the
     time; halfs by PIZ, which takes half as long as ZIP for the same size.
-    Raises CannotWrite.
+    Raises OSError.
     """
     import OpenEXR
 
@@ -216,13 +241,13 @@ def write(path: Path, radiance: NDArray[np.float32], compressed: bool = True) ->
             OpenEXR.File(header, {"RGB": stored}) as file,
         ):
             file.write(stream)
-    except (OSError, RuntimeError) as error:
-        raise cannot_write(path.parent, error) from error
+    except RuntimeError as error:
+        raise OSError(None, " ".join(str(error).split())) from error
 
 
 def write_strips(path: Path, pixels: Pixels, half: bool) -> NDArray[np.float64]:
     """Write a map a few rows at a time, as half floats if these hold it: its scalar irradiance, of
-    each channel, (3,), before it was rounded. Raises CannotWrite."""
+    each channel, (3,), before it was rounded. Raises OSError."""
     if find_spec("OpenImageIO") is None:  # there is no wheel for Windows on ARM
         whole = narrowed(pixels, pixels.width)
         write(path, whole)
@@ -233,7 +258,7 @@ def write_strips(path: Path, pixels: Pixels, half: bool) -> NDArray[np.float64]:
         for strip in pixels.strips(rows_of(pixels)):
             if half and max(plane.max() for plane in strip) > HALF_MAXIMUM:
                 break
-            image.write_rows(file, path, top, np.stack(strip, axis=-1))
+            image.write_rows(file, top, np.stack(strip, axis=-1))
             bottom = top + len(strip[0])
             total += total_light(strip, solid[top:bottom])
             top = bottom

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,9 @@ from ..errors import UnusableInput
 MAIN_LAYERS = ("", "combined", "rgba", "rgb", "beauty", "color", "colour", "c")
 """Layers that hold the picture itself, by the habit of the programs that write them: the last
 word of the layer's name in lower case."""
+
+MOST_LISTED, LONGEST_NAME = 8, 32
+"""Names in a sentence for the user, and characters of each."""
 
 COLOURS = (("r", "g", "b"), ("red", "green", "blue"))
 
@@ -67,8 +70,9 @@ def choose_layer(headers: Sequence[dict[str, Any]], name: str) -> tuple[Layer, l
     chosen = min(layers, key=lambda layer: layer.order)
     if chosen.is_main or len(layers) == 1:
         return chosen, []
-    others = ", ".join(sorted(layer.name or "(unnamed)" for layer in layers if layer != chosen))
-    return chosen, [f'Layer "{chosen.name}" is taken as the map; the file also has: {others}.']
+    others = _listed(layer.name for layer in layers if layer != chosen)
+    taken = _shown(chosen.name)
+    return chosen, [f'Layer "{taken}" is taken as the map; the file also has: {others}.']
 
 
 def _is_deep(header: dict[str, Any]) -> bool:
@@ -107,5 +111,17 @@ def _why_none(headers: Sequence[dict[str, Any]], flat: Sequence[int]) -> str:
     names = {channel.name for index in flat for channel in headers[index]["channels"]}
     if {"RY", "BY"} & {name.rpartition(".")[2] for name in names}:
         return "stores luminance and chroma (Y, RY, BY): save it with R, G and B channels first."
-    listed = ", ".join(sorted(names)) or "none"
-    return f"has no colour channels (R, G, B or Y); it has: {listed}."
+    return f"has no colour channels (R, G, B or Y); it has: {_listed(names) or 'none'}."
+
+
+def _listed(names: Iterable[str]) -> str:
+    """Names for a sentence, no more of them than one reads."""
+    shown = [_shown(name) for name in sorted(names)]
+    more = [f"and {len(shown) - MOST_LISTED} more"] if len(shown) > MOST_LISTED else []
+    return ", ".join(shown[:MOST_LISTED] + more)
+
+
+def _shown(name: str) -> str:
+    """A name as far as it can be printed: files may hold any bytes, and up to 255 of them."""
+    text = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in name)
+    return f"{text[:LONGEST_NAME]}…" if len(text) > LONGEST_NAME else text or "(unnamed)"

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import CannotWrite, UnusableInput
-from .limits import cannot_write, refuse_absurd_size, too_large_for_memory
+from ..errors import UnusableInput
+from .limits import refuse_absurd_size, too_large_for_memory
 from .quiet import quiet_libraries
+from .tiff import is_zip_whole
 
 if TYPE_CHECKING:
     from OpenImageIO import ImageInput, ImageOutput
@@ -27,8 +28,8 @@ def read(path: Path, allow_ldr: bool, upright: bool = True) -> NDArray[np.float3
     with quiet_libraries():
         source = _open(path)
         try:
-            linear = _check(source, path.name, allow_ldr)
-            pixels = _read_pixels(source, path.name)
+            linear = _check(source, path, allow_ldr)
+            pixels = _read_pixels(source, path)
             spec = source.spec()
         finally:
             source.close()
@@ -68,7 +69,7 @@ def read_rows(source: ImageInput, name: str, top: int, bottom: int) -> NDArray[n
 def created(
     path: Path, width: int, half: bool, primaries: tuple[float, ...]
 ) -> Iterator[ImageOutput]:
-    """An .exr file of a map for `write_rows`. Raises CannotWrite."""
+    """An .exr file of a map for `write_rows`. Raises OSError."""
     import OpenImageIO as oiio
 
     spec = oiio.ImageSpec(width, width // 2, 3, "half" if half else "float")
@@ -77,9 +78,9 @@ def created(
     try:
         with quiet_libraries():
             file = oiio.ImageOutput.create(str(path))
-            _raise_if_unwritten(file is not None and file.open(str(path), spec), file, path)
+            _raise_if_unwritten(file is not None and file.open(str(path), spec), file)
     except TypeError as error:
-        raise CannotWrite(f"The name of {path.parent} is not Unicode: rename it.") from error
+        raise OSError(None, "its name is not Unicode") from error
     try:
         yield file
     finally:
@@ -87,19 +88,19 @@ def created(
             file.close()
 
 
-def write_rows(file: ImageOutput, path: Path, top: int, pixels: NDArray[np.float32]) -> None:
-    """Rows that begin with this one, (rows, width, 3). Raises CannotWrite."""
+def write_rows(file: ImageOutput, top: int, pixels: NDArray[np.float32]) -> None:
+    """Rows that begin with this one, (rows, width, 3). Raises OSError."""
     with quiet_libraries():
         done = file.write_scanlines(top, top + len(pixels), 0, pixels)
-    _raise_if_unwritten(done, file, path)
+    _raise_if_unwritten(done, file)
 
 
-def _raise_if_unwritten(done: bool, file: ImageOutput | None, path: Path) -> None:
+def _raise_if_unwritten(done: bool, file: ImageOutput | None) -> None:
     import OpenImageIO as oiio
 
     if not done:
         reason = file.geterror() if file else oiio.geterror()
-        raise cannot_write(path.parent, OSError(reason or "no space is left"))
+        raise OSError(None, " ".join(reason.split()) or "there is no room for it")
 
 
 def _open(path: Path) -> ImageInput:
@@ -123,30 +124,32 @@ def _open(path: Path) -> ImageInput:
     return source
 
 
-def _check(source: ImageInput, name: str, allow_ldr: bool) -> bool:
+def _check(source: ImageInput, path: Path, allow_ldr: bool) -> bool:
     """Whether an image holds linear light. Raises UnusableInput for one that must not be read."""
     import OpenImageIO as oiio
 
     spec = source.spec()
-    refuse_absurd_size(name, spec.width, spec.height)
+    refuse_absurd_size(path.name, spec.width, spec.height, path.stat().st_size)
     linear = spec.format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
     if not linear and not allow_ldr:
         raise UnusableInput(
-            f"{name} is an LDR image ({spec.format} values, no linear light): use the "
+            f"{path.name} is an LDR image ({spec.format} values, no linear light): use the "
             "HDR version of the map, or --allow-ldr to take it as sRGB."
         )
     return linear
 
 
-def _read_pixels(source: ImageInput, name: str) -> NDArray[np.float32]:
+def _read_pixels(source: ImageInput, path: Path) -> NDArray[np.float32]:
     import OpenImageIO as oiio
 
     spec = source.spec()
     try:
         pixels = source.read_image(oiio.FLOAT)
     except MemoryError as error:
-        raise too_large_for_memory(name, spec.width, spec.height) from error
-    _raise_if_damaged(pixels, source, name)
+        raise too_large_for_memory(path.name, spec.width, spec.height) from error
+    if _is_zip(source) and not is_zip_whole(path):
+        pixels = None
+    _raise_if_damaged(pixels, source, path.name)
     return pixels
 
 
@@ -155,6 +158,11 @@ def _raise_if_damaged(pixels: NDArray[np.float32] | None, source: ImageInput, na
     if pixels is None or problem:
         reason = (problem.splitlines() or ["its pixels end too early"])[0].strip()
         raise UnusableInput(f"{name} is truncated or damaged ({reason}).")
+
+
+def _is_zip(source: ImageInput) -> bool:
+    is_tiff = source.format_name() == "tiff"
+    return is_tiff and "zip" in (source.spec().getattribute("compression") or "")
 
 
 def _upright(pixels: NDArray[np.float32], orientation: int) -> NDArray[np.float32]:

@@ -22,8 +22,11 @@ def load(path: str | Path, allow_ldr: bool = False, progress: Progress = silent)
     magic = _first_bytes(path)
     with ThreadPoolExecutor(1) as pool:
         digest = pool.submit(_sha256, path)
-        pixels, warnings = _open(path, magic, allow_ldr)
-        environment = environment_from_strips(pixels, path.stem, path.name, progress)
+        try:
+            pixels, warnings = _open(path, magic, allow_ldr)
+            environment = environment_from_strips(pixels, path.stem, path.name, progress)
+        except MemoryError as error:
+            raise UnusableInput(f"{path.name} does not fit into memory.") from error
         return replace(environment, sha256=digest.result(), warnings=tuple(warnings))
 
 

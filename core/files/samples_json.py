@@ -4,30 +4,31 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import sphere
 from ..errors import UnusableInput
 from ..pixels import whole
 from ..samples import MapOfSamples
 from . import exr
-from .lights_json import AXES, read_document
+from .belonging import read_named, read_together
+from .lights_json import AXES, DAMAGE, named_file, numbers, read_document
 
 FORMAT = "sunsplit.samples"
 VERSION = 1
 
 
-def write(path: Path, samples: MapOfSamples, map_name: str) -> None:
-    """Write the list; the Voronoi map itself lies beside it under `map_name`."""
+def write(path: Path, samples: MapOfSamples, residual: dict[str, Any]) -> None:
+    """Write the list. residual: what `lights_json` says of the Voronoi map, its SHA-256 too."""
     height, width = samples.radiance.shape[:2]
     u, v = sphere.to_image(samples.sites)
     document = {
         "format": FORMAT,
         "version": VERSION,
         "axes": AXES,
-        "map": {"file": map_name, "width": width, "height": height},
+        "map": {name: residual[name] for name in ("file", "width", "height", "sha256")},
         "samples": [
             {"to_light": site, "position": position, "scalar_irradiance": flux, "area": area}
             for site, position, flux, area in zip(
@@ -45,24 +46,21 @@ def write(path: Path, samples: MapOfSamples, map_name: str) -> None:
 def read_samples(path: str | Path) -> MapOfSamples:
     """Samples and their map, as they were written. Raises UnusableInput."""
     path = Path(path)
+    return read_together(path, lambda: _read(path))
+
+
+def _read(path: Path) -> MapOfSamples:
     document = read_document(path, FORMAT, VERSION)
     try:
         samples = document["samples"]
-        sites = _numbers(samples, "to_light").reshape(len(samples), 3)
-        flux = _numbers(samples, "scalar_irradiance").reshape(len(samples), 3)
-        area = _numbers(samples, "area").reshape(len(samples))
-        # Beside the list, whatever folders its name may hold.
-        image = path.parent / Path(document["map"]["file"]).name
+        sites = numbers([entry["to_light"] for entry in samples], len(samples), 3)
+        flux = numbers([entry["scalar_irradiance"] for entry in samples], len(samples), 3)
+        area = numbers([entry["area"] for entry in samples], len(samples))
+        image, stated = named_file(path, document["map"])
         shape = int(document["map"]["height"]), int(document["map"]["width"]), 3
-    except (KeyError, TypeError, ValueError) as error:
+    except DAMAGE as error:
         raise UnusableInput(f"{path.name} is damaged: {error!r}.") from error
-    if not image.exists():
-        raise UnusableInput(f"{image} is missing: convert the map again.")
-    radiance = whole(exr.read(image)[0])
+    radiance = read_named(image, stated, path.name, lambda file: whole(exr.read(file)[0]))
     if radiance.shape != shape:
         raise UnusableInput(f"{image.name} is another map than {path.name} says.")
     return MapOfSamples(sites, flux, area, radiance)
-
-
-def _numbers(samples: list[dict[str, object]], name: str) -> NDArray[np.float64]:
-    return np.array([entry[name] for entry in samples], dtype=np.float64)

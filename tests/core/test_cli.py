@@ -72,6 +72,18 @@ def test_convert_writes_here_unless_told_otherwise(sky_file, tmp_path, out, monk
     assert names(out) == ["map.lights.json", "map.residual.exr"]
 
 
+def test_what_an_older_conversion_had_is_said_to_go(sky_file, out, capfd):
+    assert run("convert", sky_file, "-o", out, "--preview") == 0
+    assert "removed" not in capfd.readouterr().out
+    assert run("convert", sky_file, "-o", out, "--residual", "none") == 0
+    lines = capfd.readouterr().out.splitlines()
+    assert [line for line in lines if line.startswith("removed")] == [
+        f"removed {out / name}, which was of an older conversion"
+        for name in ("map.residual.exr", "map.preview.png")
+    ]
+    assert names(out) == ["map.lights.json"]
+
+
 def test_json_is_one_object_and_nothing_else(sky_file, out, capfd):
     assert run("convert", sky_file, "-o", out, "--json", "--preview") == 0
     said, complaints = capfd.readouterr()

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import signal
@@ -11,7 +12,7 @@ import pytest
 
 from sunsplit.core.conversion import convert
 from sunsplit.core.errors import CannotWrite, UnusableInput
-from sunsplit.core.files import atomic, exr, lights_json
+from sunsplit.core.files import atomic, exr, journal, lights_json
 from sunsplit.core.files.conversion import account_of_files, save
 from sunsplit.core.files.maps import load
 from sunsplit.core.settings import ConversionSettings
@@ -53,7 +54,8 @@ def test_what_is_not_asked_for_is_not_written(tmp_path):
 def test_the_document_has_the_fields_that_others_read(tmp_path):
     source = write_exr(tmp_path / "map.exr", sunny())
     conversion = convert(load(source))
-    document = json.loads(save(conversion, tmp_path).lights.read_text())
+    files = save(conversion, tmp_path)
+    document = json.loads(files.lights.read_text())
     assert document["format"] == "sunsplit.lights"
     assert document["version"] == 1
     assert document["axes"] == "right-handed, Z up, image centre +X, u = 0.25 is +Y"
@@ -71,6 +73,7 @@ def test_the_document_has_the_fields_that_others_read(tmp_path):
         "kind": "map",
         "width": 128,
         "height": 64,
+        "sha256": hashlib.sha256(files.residual.read_bytes()).hexdigest(),
     }
     (sun,) = document["suns"]
     assert set(sun) == {
@@ -219,27 +222,14 @@ def test_a_target_that_is_a_folder_changes_nothing(older):
     assert contents(folder) == before
 
 
-def test_a_draft_that_vanishes_brings_the_older_files_back(older):
-    folder, before = older
-    del before["map.preview.png"]
-    (folder / "map.preview.png").unlink()
-    order = ["map.preview.png", "map.lights.json", "map.residual.exr"]
-    drafts = [folder.parent / f"draft {name}" for name in order]
-    for draft in drafts[:2]:
-        draft.write_text("new")
-    with pytest.raises(FileNotFoundError):
-        atomic._take_names(drafts, [folder / name for name in order])
-    assert contents(folder) == before
-
-
 def test_a_late_interrupt_says_so(tmp_path, monkeypatch):
-    rename = atomic._take_names
+    rename = journal.take_names
 
     def interrupted(*arguments):
         os.kill(os.getpid(), signal.SIGINT)
         rename(*arguments)
 
-    monkeypatch.setattr(atomic, "_take_names", interrupted)
+    monkeypatch.setattr(journal, "take_names", interrupted)
     with pytest.raises(KeyboardInterrupt, match="the files are written"):
         save(converted(), tmp_path, preview=True)
     assert names(tmp_path) == RESULT
