@@ -45,7 +45,7 @@ def opened(path: Path) -> Iterator[ImageInput]:
     with quiet_libraries():
         source = _open(path)
     try:
-        _check(source, path.name, allow_ldr=False)
+        _check(source, path, allow_ldr=False)
         yield source
     finally:
         source.close()
