@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
+from .memo import Memo
 from .region import RegionLight
 
 Floats = NDArray[np.float64]
@@ -33,7 +34,7 @@ _SUMS = 7
 
 
 @dataclass(frozen=True, eq=False)
-class Patches:
+class Patches(Memo):
     """Pieces of light.
 
     directions: unit vectors to where each has its mean, (n, 3). flux: scalar irradiance, (n, 3).

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..patches import patches_of
+import numpy as np
+
+from ..patches import MOST_PATCHES, Patches, patches_of
 from ..prediction import Prediction
 from ..region import RegionLight
 from ..settings import ConversionSettings
 from ..strata import Strata
 from .edge import edge_suns
-from .light_count import fewest
+from .edge_split import split_of
+from .light_count import FALL, fewest
 from .placement import NO_SUN, ChosenSuns
 from .sampled import sampled_suns
+
+PER_LIGHT, FEWEST_PATCHES = 256, 2048
+"""Where the number of lights is looked for, they are made of so many patches."""
 
 
 def choose_suns(
@@ -30,16 +36,23 @@ def choose_suns(
     if not len(light.pixels):
         error = Prediction.of(None, strata.light, rest).error(()) if rest else 0.0
         return ChosenSuns((), error, (NO_SUN,) if settings.share is None else (), 0.0)
-    patches = light.once(
-        ("patches", strata), lambda: patches_of(light, strata.luminance.ravel()[light.pixels])
-    )
+    patches = _patches(light, strata, MOST_PATCHES)
     prediction = light.latest(
         "prediction", (strata, rest), lambda: Prediction.of(patches, strata.light, rest)
     )
+    share = float(light.luminous_flux.sum()) / strata.light
+    allowed = settings.allowed_error(share)
+
+    def expected(count: int) -> float:
+        if settings.method != "edge":
+            return count**-FALL
+        some = _patches(light, strata, _enough_patches(count))
+        return split_of(some, settings.shape).error_of_cuts(count) * share
 
     def with_lights(count: int) -> ChosenSuns:
         if settings.method == "edge":
-            chosen = edge_suns(patches, strata, settings, count)
+            most = MOST_PATCHES if allowed is None else _enough_patches(count)
+            chosen = edge_suns(_patches(light, strata, most), strata, settings, count)
         else:
             chosen = sampled_suns(light, strata, settings, count)
         return replace(
@@ -48,14 +61,26 @@ def choose_suns(
             ground_error=prediction.wrong_on_ground(chosen.suns) / strata.part_on_ground,
         )
 
-    share = float(light.luminous_flux.sum()) / strata.light
-    allowed = settings.allowed_error(share)
     if allowed is None:
         chosen = with_lights(settings.most_lights)
     else:
-        chosen = fewest(with_lights, allowed / 100, settings.most_lights)
+        chosen = fewest(with_lights, allowed / 100, settings.most_lights, expected)
     notes = (*chosen.notes, *_count_note(chosen, light, settings, allowed))
     return replace(chosen, notes=notes)
+
+
+def _enough_patches(count: int) -> int:
+    """A power of two."""
+    return int(np.clip(PER_LIGHT << (count - 1).bit_length(), FEWEST_PATCHES, MOST_PATCHES))
+
+
+def _patches(light: RegionLight, strata: Strata, most: int) -> Patches:
+    if len(light.pixels) <= most:
+        most = MOST_PATCHES  # all of them are pixels
+    return light.once(
+        ("patches", strata, most),
+        lambda: patches_of(light, strata.luminance.ravel()[light.pixels], most),
+    )
 
 
 def _count_note(

@@ -12,12 +12,19 @@ FALL = 1.1
 guess, so that few numbers must be tried."""
 
 
-def fewest(with_lights: Callable[[int], ChosenSuns], allowed: float, most: int) -> ChosenSuns:
-    """The fewest suns, at most `most`, that are wrong by at most `allowed`: `ChosenSuns.worst`.
+def fewest(
+    with_lights: Callable[[int], ChosenSuns],
+    allowed: float,
+    most: int,
+    expected: Callable[[int], float] = lambda count: count**-FALL,
+) -> ChosenSuns:
+    """About the fewest suns, at most `most`, that are wrong by at most `allowed`:
+    `ChosenSuns.worst`.
 
+    expected: about how wrong so many are; a guess, so that few numbers must be tried.
     Where even `most` are not enough, those that are least wrong of all that were tried. The error
-    need not fall evenly with the number; the next smaller number than is returned was tried too,
-    and is not enough.
+    need not fall evenly with the number; a number smaller by at most an eighth than is returned
+    was tried too, and is not enough: up to 15 lights that is the next smaller one.
     """
     tried: dict[int, ChosenSuns] = {}
 
@@ -26,12 +33,13 @@ def fewest(with_lights: Callable[[int], ChosenSuns], allowed: float, most: int) 
             tried[count] = with_lights(count)
         return tried[count].worst
 
-    low, high = 0, 1
+    low, high = 0, _guess(1, allowed, most, expected)
     while error(high) > allowed:
         if high >= most:
             return min(tried.values(), key=lambda one: one.worst)
-        low, high = high, min(max(_guess(high, error(high), allowed), high + 1), most)
-    while high - low > 1:
+        aim = expected(high) * allowed / error(high)
+        low, high = high, _guess(high + 1, aim, most, expected)
+    while high - low > max(high // 8, 1):
         middle = (low + high) // 2
         if low and error(low) > allowed > error(high) > 0:
             # On a line between the two, in logarithms, but well inside of them.
@@ -47,5 +55,8 @@ def fewest(with_lights: Callable[[int], ChosenSuns], allowed: float, most: int) 
     return tried[high]
 
 
-def _guess(count: int, error: float, allowed: float) -> int:
-    return ceil(count * min((error / allowed) ** (1 / FALL), 8.0))
+def _guess(least: int, aim: float, most: int, expected: Callable[[int], float]) -> int:
+    """The first number, from `least` up to `most`, that is expected to be no more wrong than `aim`;
+    not many times more than `least`."""
+    last = min(8 * least, most)
+    return next((n for n in range(least, last) if expected(n) <= aim), last)
