@@ -120,7 +120,7 @@ def _limit(badness: list[Floats], most: int) -> float:
     A block is never better than one of its parts, so whatever is above has its parents above.
     """
     all_of_them = np.concatenate([level.ravel() for level in badness])
-    divisions = (most - badness[-1].size) // 3
+    divisions = (most - np.count_nonzero(badness[-1])) // 3
     if divisions <= 0:
         return np.inf
     if divisions >= len(all_of_them):

@@ -13,9 +13,12 @@ from ..settings import ConversionSettings
 from ..strata import Strata
 from .edge import edge_suns
 from .edge_split import split_of
-from .light_count import FALL, fewest
+from .light_count import fewest, first_guess
 from .placement import NO_SUN, ChosenSuns
 from .sampled import sampled_suns
+
+BALANCED = 1.6
+"""What is predicted of lights, about, against what is wrong of their cells when these are cut."""
 
 PER_LIGHT, FEWEST_PATCHES = 256, 2048
 """Where the number of lights is looked for, they are made of so many patches."""
@@ -43,16 +46,11 @@ def choose_suns(
     share = float(light.luminous_flux.sum()) / strata.light
     allowed = settings.allowed_error(share)
 
-    def expected(count: int) -> float:
-        if settings.method != "edge":
-            return count**-FALL
-        some = _patches(light, strata, _enough_patches(count))
-        return split_of(some, settings.shape).error_of_cuts(count) * share
+    cut = patches
 
     def with_lights(count: int) -> ChosenSuns:
         if settings.method == "edge":
-            most = MOST_PATCHES if allowed is None else _enough_patches(count)
-            chosen = edge_suns(_patches(light, strata, most), strata, settings, count)
+            chosen = edge_suns(cut, strata, settings, count)
         else:
             chosen = sampled_suns(light, strata, settings, count)
         return replace(
@@ -63,8 +61,17 @@ def choose_suns(
 
     if allowed is None:
         chosen = with_lights(settings.most_lights)
-    else:
+    elif settings.method == "edge":
+        rough = split_of(_patches(light, strata, FEWEST_PATCHES), settings.shape)
+
+        def expected(count: int) -> float:
+            return BALANCED * rough.error_of_cuts(count) * share
+
+        likely = first_guess(allowed / 100, settings.most_lights, expected)
+        cut = _patches(light, strata, _enough_patches(likely))
         chosen = fewest(with_lights, allowed / 100, settings.most_lights, expected)
+    else:
+        chosen = fewest(with_lights, allowed / 100, settings.most_lights)
     notes = (*chosen.notes, *_count_note(chosen, light, settings, allowed))
     return replace(chosen, notes=notes)
 

@@ -56,6 +56,11 @@ turn the widths of whole cells at each step, and never settle."""
 A_PART = 0.1
 """Of all light, what the bright or the faint part has at least: a sun's dark rim is none."""
 
+FLUX, RELATIVE, VECTORS = slice(0, 3), slice(3, 6), slice(6, 15)
+TOTAL, SEEN = slice(15, 15 + JUDGED), slice(15 + JUDGED, 15 + 2 * JUDGED)
+HELD = SEEN.stop
+"""Columns of what is summed over cells, see `EdgeLight.held`, and how many there are."""
+
 DISTANCES = 1 << 16
 """Distances of patches to cells that are held in memory at a time."""
 
@@ -67,18 +72,22 @@ CELLS = 512
 class PatchCells:
     """Cells of patches and the disc or point in the place of each.
 
-    owner: the cell of each patch, (p,). held: sums over each cell, see `EdgeLight.held`, (n, 12).
-    flux: scalar irradiance of each cell, (n, 3). to_light: unit vectors, (n, 3). shortfall: 1 - R
-    of each, where R is the length of its mean direction, (n,). error: predicted for all of them
-    together, as a part of all light of the channel that is most wrong.
+    owner: the cell of each patch, (p,). held: sums over each cell, see `EdgeLight.held`, (n, HELD).
+    to_light: unit vectors, (n, 3). shortfall: 1 - R of each, where R is the length of its mean
+    direction, (n,). error: predicted for all of them together, as a part of all light of the
+    channel that is most wrong.
     """
 
     owner: Owner
     held: Floats
-    flux: Floats
     to_light: Floats
     shortfall: Floats
     error: float
+
+    @property
+    def flux(self) -> Floats:
+        """Scalar irradiance of each cell, (n, 3)."""
+        return self.held[:, FLUX]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,11 +142,14 @@ class EdgeLight:
 
     @cached_property
     def held(self) -> Floats:
-        """What the moments of cells are made of sums of, (p, 12): red, green and blue, see
-        `relative`, and the mean direction times red, times green and times blue."""
+        """All that is asked of cells in sums over their patches, (p, HELD): flux; what is
+        `relative`; the mean direction times each of that; what is `judged`; and what level ground
+        gets of that. One product of matrices sums them all."""
         mean = (1 - self.patches.spread)[:, None] * self.patches.directions
         vectors = self.relative[:, :, None] * mean[:, None, :]
-        return np.concatenate([self.relative, vectors.reshape(-1, 9)], axis=1)
+        seen = self.judged * facing_up(self.patches.directions, self.half_width)[:, None]
+        parts = [self.patches.flux, self.relative, vectors.reshape(-1, 9), self.judged, seen]
+        return np.concatenate(parts, axis=1)
 
     @cached_property
     def features(self) -> Floats:
@@ -145,17 +157,13 @@ class EdgeLight:
         red and times blue against all of the patch's light."""
         whole = np.maximum(self.light, 1e-300)[:, None]
         parts = [self.patches.directions, np.ones_like(whole)]
-        parts += [self.held[:, 3 * c + 3 : 3 * c + 6] / whole for c in PULLED]
+        vectors = self.held[:, VECTORS]
+        parts += [vectors[:, 3 * c : 3 * c + 3] / whole for c in PULLED]
         return np.concatenate(parts, axis=1)
 
     @cached_property
     def half_width(self) -> Floats:
         return half_widths(self.patches.spread)
-
-    @cached_property
-    def on_ground(self) -> Floats:
-        """What level ground gets of each patch: the cosine, 0 below the horizon, (p,)."""
-        return facing_up(self.patches.directions, self.half_width)
 
     def squared_errors(self, members: Owner, owner: Owner, count: int) -> Floats:
         """Mean over all great circles of what each cell's disc lets through too much or too
@@ -164,30 +172,14 @@ class EdgeLight:
         members: patches, (m,), with the cell of each, rising from 0: every cell has one.
         """
         held = _sums(owner, self.held.take(members, axis=0), count)
-        to_light, shortfall = self._moments(held, members, owner)
-        half = np.zeros(count)
-        if self.shape == "disc":
-            half = disc_diameter(shortfall) / 2
-        judged = self.judged.take(members, axis=0)
-        total = _sums(owner, judged, count)
-        directions = self.patches.directions.take(members, axis=0)
-        edges = edges_across(
-            directions, self.half_width[members], judged, owner, to_light, TURNS, PLACES
-        )
-        of_disc = cap_beyond(edges.height, half[:, None])
-        wrong = edges.beyond - total[:, None, :] * of_disc[..., None]
-        squared = np.einsum("ne,nek->nk", edges.part, wrong**2)
-        seen = _sums(owner, judged * self.on_ground[members, None], count)
-        ground = seen - total * disc_on_ground(to_light[:, 2], half)[:, None]
-        return squared + GROUND * ground**2
+        return self._squared_errors(members, owner, held)
 
     def widths(self, members: Owner, owner: Owner, count: int) -> Floats:
         """About what `squared_errors` says, at a fifth of the time: light squared, times how wide
         it is, (n, JUDGED)."""
         held = _sums(owner, self.held.take(members, axis=0), count)
         _, shortfall = self._moments(held, members, owner)
-        judged = _sums(owner, self.judged.take(members, axis=0), count)
-        return judged**2 * np.sqrt(shortfall)[:, None]
+        return held[:, TOTAL] ** 2 * np.sqrt(shortfall)[:, None]
 
     def halves(self, members: Owner) -> NDArray[np.bool_] | None:
         """Which members come first if a cell is cut at its mean, across its longest axis, or
@@ -212,18 +204,17 @@ class EdgeLight:
         count = int(occupied.sum())
         held = _sums(owner, self.held, count)
         to_light, shortfall = self._moments(held, np.arange(len(owner)), owner)
-        flux = _sums(owner, self.patches.flux, count)
-        return PatchCells(owner, held, flux, to_light, shortfall, np.inf)
+        return PatchCells(owner, held, to_light, shortfall, np.inf)
 
     def judge(self, cells: PatchCells) -> PatchCells:
         """The same cells with their predicted error."""
         order = np.argsort(cells.owner, kind="stable")
         owner = cells.owner[order]
         squared = np.zeros(JUDGED)
-        for first in range(0, len(cells.flux), CELLS):
-            count = min(CELLS, len(cells.flux) - first)
-            some = slice(*np.searchsorted(owner, (first, first + count)))
-            squared += self.squared_errors(order[some], owner[some] - first, count).sum(axis=0)
+        for first in range(0, len(cells.held), CELLS):
+            held = cells.held[first : first + CELLS]
+            some = slice(*np.searchsorted(owner, (first, first + len(held))))
+            squared += self._squared_errors(order[some], owner[some] - first, held).sum(axis=0)
         return replace(cells, error=error_of(squared))
 
     def shared_out(self, cells: PatchCells) -> Owner:
@@ -232,11 +223,27 @@ class EdgeLight:
         Near, in a measure of each cell's own: bright and narrow cells take little from around
         them. And where it brings the colours of a cell back together.
         """
-        whole = cells.held[:, :3] @ SEEN_BY / SEEN_BY.sum()
+        whole = cells.held[:, RELATIVE] @ SEEN_BY / SEEN_BY.sum()
         owner = self._nearest(cells, whole)
         stays = self.light > HEAVY * whole[cells.owner]
         owner[stays] = cells.owner[stays]
         return owner
+
+    def _squared_errors(self, members: Owner, owner: Owner, held: Floats) -> Floats:
+        """See `squared_errors`. held: what each cell holds of it all, (n, HELD)."""
+        to_light, shortfall = self._moments(held, members, owner)
+        half = np.zeros(len(held))
+        if self.shape == "disc":
+            half = disc_diameter(shortfall) / 2
+        judged = self.judged.take(members, axis=0)
+        directions = self.patches.directions.take(members, axis=0)
+        half_width = self.half_width.take(members)
+        edges = edges_across(directions, half_width, judged, owner, to_light, TURNS, PLACES)
+        of_disc = cap_beyond(edges.height, half[:, None])
+        wrong = edges.beyond - held[:, None, TOTAL] * of_disc[..., None]
+        squared = np.einsum("ne,nek->nk", edges.part, wrong**2)
+        on_ground = disc_on_ground(to_light[:, 2], half)[:, None]
+        return squared + GROUND * (held[:, SEEN] - held[:, TOTAL] * on_ground) ** 2
 
     def _nearest(self, cells: PatchCells, whole: Floats) -> Owner:
         """The cell to which the distance of each patch is the least, (p,).
@@ -249,7 +256,7 @@ class EdgeLight:
         # linear in a patch's direction, so that one product of matrices holds them all.
         of_cells = [-2 * cells.to_light * scale[:, None], 2 * scale[:, None]]
         for channel in PULLED:
-            vector = cells.held[:, 3 * channel + 3 : 3 * channel + 6]
+            vector = cells.held[:, VECTORS][:, 3 * channel : 3 * channel + 3]
             aside = vector - (vector * cells.to_light).sum(axis=1)[:, None] * cells.to_light
             aside *= (TOGETHER * scale / np.maximum(whole, 1e-300))[:, None]
             of_cells.append(aside)
@@ -269,9 +276,9 @@ class EdgeLight:
         What a patch counts is by its cell's own colour, as what is little of a channel may lie
         anywhere. Each patch is as long as the mean of what it holds: sums are as over its pixels.
         """
-        shares = SEEN_BY * held[:, :3]
-        total = (shares * held[:, :3]).sum(axis=1)
-        vector = np.einsum("nc,nca->na", shares, held[:, 3:].reshape(-1, 3, 3))
+        shares = SEEN_BY * held[:, RELATIVE]
+        total = (shares * held[:, RELATIVE]).sum(axis=1)
+        vector = np.einsum("nc,nca->na", shares, held[:, VECTORS].reshape(-1, 3, 3))
         length = np.linalg.norm(vector, axis=1)
         lost = length <= 1e-9 * total  # light from all sides
         to_light = vector / np.where(lost, 1, length)[:, None]

@@ -89,7 +89,10 @@ class EdgeSplit:
 
 
 def _balanced(light: EdgeLight, cells: PatchCells, steps: int) -> PatchCells:
-    """The cells after sharing out their borders so many times."""
+    """The cells after sharing out their borders so many times, or when nothing moves any more."""
     for _ in range(steps):
-        cells = light.cells(light.shared_out(cells))
+        owner = light.shared_out(cells)
+        if np.array_equal(owner, cells.owner):
+            break
+        cells = light.cells(owner)
     return cells

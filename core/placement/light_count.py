@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import ceil, log
+from math import log
 
 from .placement import ChosenSuns
 
 FALL = 1.1
 """The error falls about as the number of lights to this power, see docs/benchmarks/lights: a first
 guess, so that few numbers must be tried."""
+
+CAUTION = 2 / 3
+"""What is most wrong of too few lights falls faster than what is expected, by this power: level
+ground is at once right where no cell lies across the horizon any more."""
 
 
 def fewest(
@@ -33,11 +37,11 @@ def fewest(
             tried[count] = with_lights(count)
         return tried[count].worst
 
-    low, high = 0, _guess(1, allowed, most, expected)
+    low, high = 0, first_guess(allowed, most, expected)
     while error(high) > allowed:
         if high >= most:
             return min(tried.values(), key=lambda one: one.worst)
-        aim = expected(high) * allowed / error(high)
+        aim = expected(high) * (allowed / error(high)) ** CAUTION
         low, high = high, _guess(high + 1, aim, most, expected)
     while high - low > max(high // 8, 1):
         middle = (low + high) // 2
@@ -55,8 +59,13 @@ def fewest(
     return tried[high]
 
 
+def first_guess(allowed: float, most: int, expected: Callable[[int], float]) -> int:
+    """The number of lights that `fewest` tries first."""
+    return _guess(1, allowed, most, expected)
+
+
 def _guess(least: int, aim: float, most: int, expected: Callable[[int], float]) -> int:
     """The first number, from `least` up to `most`, that is expected to be no more wrong than `aim`;
     not many times more than `least`."""
-    last = min(8 * least, most)
+    last = min(max(8 * least, 64), most)
     return next((n for n in range(least, last) if expected(n) <= aim), last)
