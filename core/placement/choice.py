@@ -20,7 +20,7 @@ from .sampled import sampled_suns
 BALANCED = 1.6
 """What is predicted of lights, about, against what is wrong of their cells when these are cut."""
 
-PER_LIGHT, FEWEST_PATCHES = 256, 2048
+PER_LIGHT, FEWEST_PATCHES = 128, 2048
 """Where the number of lights is looked for, they are made of so many patches."""
 
 
