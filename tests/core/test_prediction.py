@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from sunsplit.core import ConversionSettings, convert, load
 from sunsplit.core.environment import LUMINANCE_WEIGHTS
+from sunsplit.core.placement import choice
 from sunsplit.core.placement.light_count import fewest
 from sunsplit.core.placement.placement import ON_GROUND
 from tests.benchmarks.occluders import NEVER, Occluders, draw_occluders, light_of, light_of_suns
@@ -59,6 +60,28 @@ def test_as_few_lights_as_the_tolerance_allows(sunrise, tolerance):
     at_most = convert(found, ConversionSettings(share=1, lights=500, tolerance=tolerance))
     assert len(at_most.suns) == count
     assert f"{count} of 500 lights: as few are within" in " ".join(at_most.notes)
+
+
+def two_suns_and_a_sky():
+    pixels = sky(512, (0.3, 0.4, 0.6)) * np.linspace(1.5, 0.5, 256)[:, None, None]
+    paint_disc(pixels, direction(30, 25), 3, (300, 250, 200))
+    paint_disc(pixels, direction(-80, 10), 9, (20, 25, 30))
+    return environment(pixels)
+
+
+@pytest.mark.parametrize("share", [None, 1])
+@pytest.mark.parametrize("real", [True, False])
+def test_fewer_patches_find_about_as_many_lights(sunrise, monkeypatch, real, share):
+    settings = ConversionSettings(share=share, tolerance=1.0)
+    made = []
+    for fewest_patches in (choice.FEWEST_PATCHES, choice.MOST_PATCHES):
+        monkeypatch.setattr(choice, "FEWEST_PATCHES", fewest_patches)
+        found = load(sunrise) if real else two_suns_and_a_sky()
+        conversion = convert(found, settings)
+        assert wrong(conversion) <= 0.01
+        made.append(len(conversion.suns))
+    print("fewer patches, most patches:", made)
+    assert abs(made[0] - made[1]) <= max(0.15 * made[1], 1)
 
 
 def wrong(conversion) -> float:
