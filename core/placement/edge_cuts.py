@@ -28,12 +28,16 @@ class _Cell:
 
 
 class Cuts:
-    """One cell, two cells, ... of the patches of a light; more are cut when they are asked for."""
+    """One cell, two cells, ... of the patches of a light; more are cut when they are asked for.
+
+    ends: how many cells there were each time after the worst were cut, rising.
+    """
 
     def __init__(self, light: EdgeLight, measure: Measure) -> None:
         self._light, self._measure = light, measure
         self._owner = np.zeros(len(light.patches), np.intp)
         self._parents = [0]
+        self.ends = [1]
         self._wrong: list[Floats] = []
         self._heap: list[_Cell] = []
         self._made = 0
@@ -83,6 +87,7 @@ class Cuts:
         for number, worst in enumerate(cut):
             halves = wrong[2 * number] + wrong[2 * number + 1]
             self._wrong.append(self._wrong[-1] - worst.wrong + halves)
+        self.ends.append(self.count)
 
     def _measured(self, made: list[tuple[int, Owner]]) -> Floats:
         """What is wrong of new cells, (m, JUDGED), which may be cut from now on."""

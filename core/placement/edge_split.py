@@ -22,9 +22,6 @@ comes with the first two times."""
 GO_ON = 2
 """Of the cells that were tried, how many go into another round."""
 
-FLAT = 1.02
-"""By so much more of squared errors before balancing more cells are not the worse ones."""
-
 
 def edge_split(patches: Patches, count: int, shape: Shape, allowed: float = 0.0) -> PatchCells:
     """At most `count` cells: as many as make the predicted error smaller, until it is `allowed`.
@@ -80,12 +77,15 @@ class EdgeSplit:
     def _enough(self, count: int, allowed: float) -> int:
         """With how many cells, before they are balanced, least is wrong, or little enough."""
         self._truest.grow(count, allowed)
-        wrong = self._truest.wrong[:count]
+        last = min(count, self._truest.count)
+        # Where only some of the worst are cut, the rest of them would be next.
+        numbers = np.array([*(end for end in self._truest.ends if end < last), last])
+        wrong = self._truest.wrong[numbers - 1]
         within = np.sqrt(wrong.max(axis=1)) <= allowed
-        last = int(np.argmax(within)) + 1 if within.any() else len(wrong)
-        squared = wrong[:last].sum(axis=1)
+        if within.any():
+            wrong = wrong[: np.argmax(within) + 1]
         # A round sun cut in two is two bad halves.
-        return int(np.flatnonzero(squared <= FLAT * squared.min())[-1]) + 1
+        return int(numbers[np.argmin(wrong.sum(axis=1))])
 
 
 def _balanced(light: EdgeLight, cells: PatchCells, steps: int) -> PatchCells:
