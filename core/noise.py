@@ -126,14 +126,15 @@ def borders(lum: Floats, solid: Floats) -> Borders:
     square = float(weighted_sum(solid, (lum**2).sum(axis=1)))
     level = _levels(float(flat.max()), LOWEST * light / (4 * np.pi))
     bright = np.flatnonzero(flat > level[-1])
-    bright = bright[np.argsort(-flat[bright], kind="stable")]
     value, weight_of = flat[bright], weight[bright]
-    # Sums over the 0, 1, 2, ... brightest pixels: of the pixels themselves, and of their light.
+    first = np.searchsorted(-level, -value, side="right")  # the highest level that is below
+    # Of the pixels above each level: of the pixels themselves, and of their light.
     pixels = weight_of[:, None] * harmonics(sphere.pixel_directions(bright, width, height))
-    count = np.searchsorted(-value, -level)
-    area, shining = _sums_to(pixels, count), _sums_to(pixels * value[:, None], count)
-    suns = shining - level[:, None] * area
-    squares = _sums_to(np.stack([weight_of, weight_of * value**2], axis=-1), count)
+    area = _sums_to(pixels, first, len(level))
+    pixels *= value[:, None]
+    suns = _sums_to(pixels, first, len(level)) - level[:, None] * area
+    of_squares = np.stack([weight_of, weight_of * value**2], axis=-1)
+    squares = _sums_to(of_squares, first, len(level))
     above = squares[:, 1] - level**2 * squares[:, 0]
     rest = _all_harmonics(lum * solid[:, None]) - suns
     unit = 16 / light**2
@@ -150,11 +151,13 @@ def _levels(highest: float, lowest: float) -> Floats:
     return highest * 2.0 ** (-np.arange(count) / PER_OCTAVE)
 
 
-def _sums_to(values: Floats, count: NDArray[np.intp]) -> Floats:
-    """Sums of the first count rows of values (p, c), for many counts (n,): (n, c)."""
-    sums = np.zeros((len(values) + 1, values.shape[1]))
-    np.cumsum(values, axis=0, out=sums[1:])
-    return sums[count]
+def _sums_to(values: Floats, first: NDArray[np.intp], count: int) -> Floats:
+    """Sums of values (p, c) with a first of 0, of 0 and 1, ... up to count - 1: (count, c)."""
+    from scipy.sparse import csc_array
+
+    pixels = len(first)
+    of_first = csc_array((np.ones(pixels), first, np.arange(pixels + 1)), shape=(count, pixels))
+    return np.cumsum(of_first @ values, axis=0)
 
 
 def _all_harmonics(light: Floats) -> Floats:

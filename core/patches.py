@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
+from .memo import Memo
 from .region import RegionLight
 
 Floats = NDArray[np.float64]
@@ -33,7 +34,7 @@ _SUMS = 7
 
 
 @dataclass(frozen=True, eq=False)
-class Patches:
+class Patches(Memo):
     """Pieces of light.
 
     directions: unit vectors to where each has its mean, (n, 3). flux: scalar irradiance, (n, 3).
@@ -114,7 +115,7 @@ def _limit(badness: list[Floats], most: int) -> float:
     A block is never better than one of its parts, so whatever is above has its parents above.
     """
     all_of_them = np.concatenate([level.ravel() for level in badness])
-    divisions = (most - badness[-1].size) // 3
+    divisions = (most - np.count_nonzero(badness[-1])) // 3
     if divisions <= 0:
         return np.inf
     if divisions >= len(all_of_them):

@@ -24,33 +24,37 @@ def surroundings(radiance: NDArray[np.float32], region: NDArray[np.bool_]) -> ND
     flat = radiance.reshape(-1, 3)
     labels, count = sphere.connected_groups(region)
     pixels = np.flatnonzero(region)
-    result = np.zeros((len(pixels), 3), np.float32)
-    for group in sphere.group_pixels(labels, count):
-        near = sphere.neighbours(group, width, height)
-        outside = ~region.ravel()[near]
-        if not outside.any():
-            continue
-        rim = flat[near[outside]].mean(axis=0, dtype=np.float64)
-        smooth = rim if len(group) > LARGE else _harmonic(flat, group, near, outside)
-        inside = np.searchsorted(pixels, group)
-        result[inside] = np.minimum(smooth.astype(np.float32), flat[group])
-    return result
+    owner = labels.ravel()[pixels] - 1
+    near = sphere.neighbours(pixels, width, height)
+    outside = ~region.ravel()[near]
+    size = np.bincount(owner, minlength=count)
+    rimmed = np.bincount(owner, outside.any(axis=1), count) > 0
+    result = np.zeros((len(pixels), 3))
+    for group in np.flatnonzero(rimmed & (size > LARGE)):
+        mine = owner == group
+        rim = flat[near[mine][outside[mine]]]
+        result[mine] = rim.mean(axis=0, dtype=np.float64)
+    smooth = (rimmed & (size <= LARGE))[owner]
+    if smooth.any():
+        # All groups at once: what does not touch does not matter to each other.
+        result[smooth] = _harmonic(flat, pixels[smooth], near[smooth], outside[smooth])
+    return np.minimum(result.astype(np.float32), flat[pixels])
 
 
 def _harmonic(
     flat: NDArray[np.float32],
-    group: NDArray[np.intp],
+    pixels: NDArray[np.intp],
     near: NDArray[np.intp],
     outside: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
-    """Each pixel of the group the mean of its four neighbours; those outside are given."""
+    """Each of the pixels, rising, the mean of its four neighbours; those outside are given."""
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import splu
 
-    count = len(group)
+    count = len(pixels)
     own = np.arange(count)
     row, side = np.nonzero(~outside)
-    column = np.searchsorted(group, near[row, side])
+    column = np.searchsorted(pixels, near[row, side])
     values = np.concatenate([np.full(count, 4.0), np.full(len(row), -1.0)])
     places = np.concatenate([own, row]), np.concatenate([own, column])
     matrix = csc_array((values, places), shape=(count, count))

@@ -4,15 +4,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..patches import patches_of
+import numpy as np
+
+from ..patches import MOST_PATCHES, Patches, patches_of
 from ..prediction import Prediction
 from ..region import RegionLight
 from ..settings import ConversionSettings
 from ..strata import Strata
 from .edge import edge_suns
-from .light_count import fewest
+from .edge_split import split_of
+from .level import levelled
+from .light_count import fewest, first_guess
 from .placement import NO_SUN, ChosenSuns
 from .sampled import sampled_suns
+
+BALANCED = 1.6
+"""What is predicted of lights, about, against what is wrong of their cells when these are cut."""
+
+PER_LIGHT, FEWEST_PATCHES = 128, 2048
+"""Where the number of lights is looked for, they are made of so many patches. With twice as many
+the numbers that come out are the same but for chance."""
 
 
 def choose_suns(
@@ -30,32 +41,78 @@ def choose_suns(
     if not len(light.pixels):
         error = Prediction.of(None, strata.light, rest).error(()) if rest else 0.0
         return ChosenSuns((), error, (NO_SUN,) if settings.share is None else (), 0.0)
-    patches = light.once(
-        ("patches", strata), lambda: patches_of(light, strata.luminance.ravel()[light.pixels])
-    )
+    patches = _patches(light, strata, MOST_PATCHES)
     prediction = light.latest(
         "prediction", (strata, rest), lambda: Prediction.of(patches, strata.light, rest)
     )
+    allowed = settings.allowed_error(float(light.luminous_flux.sum()) / strata.light)
+    if settings.method != "edge":
 
-    def with_lights(count: int) -> ChosenSuns:
-        if settings.method == "edge":
-            chosen = edge_suns(patches, strata, settings, count)
+        def sampled(count: int) -> ChosenSuns:
+            return _judged(sampled_suns(light, strata, settings, count), prediction, strata)
+
+        if allowed is None:
+            chosen = sampled(settings.most_lights)
         else:
-            chosen = sampled_suns(light, strata, settings, count)
-        return replace(
-            chosen,
-            predicted_error=prediction.error(chosen.suns),
-            ground_error=prediction.wrong_on_ground(chosen.suns) / strata.part_on_ground,
-        )
-
-    share = float(light.luminous_flux.sum()) / strata.light
-    allowed = settings.allowed_error(share)
-    if allowed is None:
-        chosen = with_lights(settings.most_lights)
+            chosen = fewest(sampled, allowed / 100, settings.most_lights)
+    elif allowed is None:
+        chosen = edge_suns(patches, strata, settings, settings.most_lights)
+        chosen = _judged(chosen, prediction, strata)
     else:
-        chosen = fewest(with_lights, allowed / 100, settings.most_lights)
+        chosen = _fewest_by_edge(light, strata, settings, prediction, allowed / 100)
     notes = (*chosen.notes, *_count_note(chosen, light, settings, allowed))
     return replace(chosen, notes=notes)
+
+
+def _fewest_by_edge(
+    light: RegionLight,
+    strata: Strata,
+    settings: ConversionSettings,
+    prediction: Prediction,
+    allowed: float,
+) -> ChosenSuns:
+    """As few as are within a part of the mean irradiance."""
+    rough = split_of(_patches(light, strata, FEWEST_PATCHES), settings.shape)
+    share = float(light.luminous_flux.sum()) / strata.light
+
+    def expected(count: int) -> float:
+        return BALANCED * rough.error_of_cuts(count) * share
+
+    likely = first_guess(allowed, settings.most_lights, expected)
+    # The same for all numbers, so that they share their cuts.
+    patches = _patches(light, strata, _enough_patches(likely))
+
+    def with_lights(count: int) -> ChosenSuns:
+        chosen = _judged(edge_suns(patches, strata, settings, count), prediction, strata)
+        if chosen.worst <= allowed or chosen.worst == chosen.predicted_error:
+            return chosen
+        level = replace(chosen, suns=levelled(chosen.suns, prediction.ground))
+        return min(chosen, _judged(level, prediction, strata), key=lambda one: one.worst)
+
+    return fewest(with_lights, allowed, settings.most_lights, expected)
+
+
+def _judged(chosen: ChosenSuns, prediction: Prediction, strata: Strata) -> ChosenSuns:
+    """The same suns with their predicted errors."""
+    return replace(
+        chosen,
+        predicted_error=prediction.error(chosen.suns),
+        ground_error=prediction.wrong_on_ground(chosen.suns) / strata.part_on_ground,
+    )
+
+
+def _enough_patches(count: int) -> int:
+    """For so many lights; a power of two."""
+    return int(np.clip(PER_LIGHT << (count - 1).bit_length(), FEWEST_PATCHES, MOST_PATCHES))
+
+
+def _patches(light: RegionLight, strata: Strata, most: int) -> Patches:
+    if len(light.pixels) <= most:
+        most = MOST_PATCHES  # all of them are pixels
+    return light.once(
+        ("patches", strata, most),
+        lambda: patches_of(light, strata.luminance.ravel()[light.pixels], most),
+    )
 
 
 def _count_note(

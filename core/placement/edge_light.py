@@ -47,12 +47,20 @@ GROUND = 1.0
 """How much what level ground gets wrong counts against a shadow's edge anywhere: the horizon is one
 edge that nearly every scene has. With 10, shadows of 4 lights get 15 % worse."""
 
+PULLED = 0, 2
+"""The channels that are brought back, red and blue: green lies between."""
+
 HEAVY = 0.1
 """A patch with more than this part of its cell's light stays there: from hand to hand it would
 turn the widths of whole cells at each step, and never settle."""
 
 A_PART = 0.1
 """Of all light, what the bright or the faint part has at least: a sun's dark rim is none."""
+
+FLUX, RELATIVE, VECTORS = slice(0, 3), slice(3, 6), slice(6, 15)
+TOTAL, SEEN = slice(15, 15 + JUDGED), slice(15 + JUDGED, 15 + 2 * JUDGED)
+HELD = SEEN.stop
+"""Columns of what is summed over cells, see `EdgeLight.held`, and how many there are."""
 
 DISTANCES = 1 << 14
 """Distances of patches to cells that are worked out at a time: few enough for a processor's own
@@ -66,17 +74,22 @@ CELLS = 512
 class PatchCells:
     """Cells of patches and the disc or point in the place of each.
 
-    owner: the cell of each patch, (p,). flux: scalar irradiance of each cell, (n, 3). to_light:
-    unit vectors, (n, 3). shortfall: 1 - R of each, where R is the length of its mean
+    owner: the cell of each patch, (p,). held: sums over each cell, see `EdgeLight.held`, (n, HELD).
+    to_light: unit vectors, (n, 3). shortfall: 1 - R of each, where R is the length of its mean
     direction, (n,). error: predicted for all of them together, as a part of all light of the
     channel that is most wrong.
     """
 
     owner: Owner
-    flux: Floats
+    held: Floats
     to_light: Floats
     shortfall: Floats
     error: float
+
+    @property
+    def flux(self) -> Floats:
+        """Scalar irradiance of each cell, (n, 3)."""
+        return self.held[:, FLUX]
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,10 +143,15 @@ class EdgeLight:
         return self.relative @ SEEN_BY / SEEN_BY.sum()
 
     @cached_property
-    def weighted(self) -> dict[int, Floats]:
-        """Mean direction times red and times blue of each patch, (p, 3) each."""
+    def held(self) -> Floats:
+        """All that is asked of cells in sums over their patches, (p, HELD): flux; what is
+        `relative`; the mean direction times each of that; what is `judged`; and what level ground
+        gets of that. One product of matrices sums them all."""
         mean = (1 - self.patches.spread)[:, None] * self.patches.directions
-        return {c: self.relative[:, c, None] * mean for c in (0, 2)}
+        vectors = self.relative[:, :, None] * mean[:, None, :]
+        seen = self.judged * facing_up(self.patches.directions, self.half_width)[:, None]
+        parts = [self.patches.flux, self.relative, vectors.reshape(-1, 9), self.judged, seen]
+        return np.concatenate(parts, axis=1)
 
     @cached_property
     def features(self) -> Floats:
@@ -141,18 +159,13 @@ class EdgeLight:
         red and times blue against all of the patch's light."""
         whole = np.maximum(self.light, 1e-300)[:, None]
         parts = [self.patches.directions, np.ones_like(whole)]
-        for vector in self.weighted.values():
-            parts.append(vector / whole)
+        vectors = self.held[:, VECTORS]
+        parts += [vectors[:, 3 * c : 3 * c + 3] / whole for c in PULLED]
         return np.concatenate(parts, axis=1)
 
     @cached_property
     def half_width(self) -> Floats:
         return half_widths(self.patches.spread)
-
-    @cached_property
-    def on_ground(self) -> Floats:
-        """What level ground gets of each patch: the cosine, 0 below the horizon, (p,)."""
-        return facing_up(self.patches.directions, self.half_width)
 
     def squared_errors(self, members: Owner, owner: Owner, count: int) -> Floats:
         """Mean over all great circles of what each cell's disc lets through too much or too
@@ -160,28 +173,15 @@ class EdgeLight:
 
         members: patches, (m,), with the cell of each, rising from 0: every cell has one.
         """
-        to_light, shortfall = self._moments(members, owner, count)
-        half = np.zeros(count)
-        if self.shape == "disc":
-            half = disc_diameter(shortfall) / 2
-        judged = self.judged[members]
-        total = _sums(owner, judged, count)
-        edges = edges_across(
-            *(self.patches.directions[members], self.half_width[members], judged),
-            *(owner, to_light, TURNS, PLACES),
-        )
-        of_disc = cap_beyond(edges.height, half[:, None])
-        wrong = edges.beyond - total[:, None, :] * of_disc[..., None]
-        squared = np.einsum("ne,nek->nk", edges.part, wrong**2)
-        seen = _sums(owner, judged * self.on_ground[members, None], count)
-        ground = seen - total * disc_on_ground(to_light[:, 2], half)[:, None]
-        return squared + GROUND * ground**2
+        held = _sums(owner, self.held.take(members, axis=0), count)
+        return self._squared_errors(members, owner, held)
 
     def widths(self, members: Owner, owner: Owner, count: int) -> Floats:
         """About what `squared_errors` says, at a fifth of the time: light squared, times how wide
         it is, (n, JUDGED)."""
-        _, shortfall = self._moments(members, owner, count)
-        return _sums(owner, self.judged[members], count) ** 2 * np.sqrt(shortfall)[:, None]
+        held = _sums(owner, self.held.take(members, axis=0), count)
+        _, shortfall = self._moments(held, members, owner)
+        return held[:, TOTAL] ** 2 * np.sqrt(shortfall)[:, None]
 
     def halves(self, members: Owner) -> NDArray[np.bool_] | None:
         """Which members come first if a cell is cut at its mean, across its longest axis, or
@@ -191,8 +191,9 @@ class EdgeLight:
         part = self.part[members] > 0
         if part.any() and not part.all():
             return part
-        directions = self.patches.directions[members]
-        weight = self._weight(members, np.zeros(len(members), np.intp), 1)
+        directions = self.patches.directions.take(members, axis=0)
+        relative = self.relative.take(members, axis=0)
+        weight = relative @ (SEEN_BY * relative.sum(axis=0))
         offset = directions - weighted_sum(weight, directions) / weight.sum()
         _, axes = np.linalg.eigh((offset * weight[:, None]).T @ offset)
         first = offset @ axes[:, -1] < 0
@@ -203,19 +204,19 @@ class EdgeLight:
         occupied = np.bincount(owner) > 0
         owner = (np.cumsum(occupied) - 1)[owner]
         count = int(occupied.sum())
-        to_light, shortfall = self._moments(np.arange(len(owner)), owner, count)
-        flux = _sums(owner, self.patches.flux, count)
-        return PatchCells(owner, flux, to_light, shortfall, np.inf)
+        held = _sums(owner, self.held, count)
+        to_light, shortfall = self._moments(held, np.arange(len(owner)), owner)
+        return PatchCells(owner, held, to_light, shortfall, np.inf)
 
     def judge(self, cells: PatchCells) -> PatchCells:
         """The same cells with their predicted error."""
         order = np.argsort(cells.owner, kind="stable")
         owner = cells.owner[order]
         squared = np.zeros(JUDGED)
-        for first in range(0, len(cells.flux), CELLS):
-            count = min(CELLS, len(cells.flux) - first)
-            some = slice(*np.searchsorted(owner, (first, first + count)))
-            squared += self.squared_errors(order[some], owner[some] - first, count).sum(axis=0)
+        for first in range(0, len(cells.held), CELLS):
+            held = cells.held[first : first + CELLS]
+            some = slice(*np.searchsorted(owner, (first, first + len(held))))
+            squared += self._squared_errors(order[some], owner[some] - first, held).sum(axis=0)
         return replace(cells, error=error_of(squared))
 
     def shared_out(self, cells: PatchCells) -> Owner:
@@ -224,15 +225,40 @@ class EdgeLight:
         Near, in a measure of each cell's own: bright and narrow cells take little from around
         them. And where it brings the colours of a cell back together.
         """
-        count = len(cells.flux)
-        of_cell = _sums(cells.owner, self.relative, count)
-        whole = of_cell @ SEEN_BY / SEEN_BY.sum()
+        whole = cells.held[:, RELATIVE] @ SEEN_BY / SEEN_BY.sum()
+        owner = self._nearest(cells, whole)
+        stays = self.light > HEAVY * whole[cells.owner]
+        owner[stays] = cells.owner[stays]
+        return owner
+
+    def _squared_errors(self, members: Owner, owner: Owner, held: Floats) -> Floats:
+        """See `squared_errors`. held: what each cell holds of it all, (n, HELD)."""
+        to_light, shortfall = self._moments(held, members, owner)
+        half = np.zeros(len(held))
+        if self.shape == "disc":
+            half = disc_diameter(shortfall) / 2
+        judged = self.judged.take(members, axis=0)
+        directions = self.patches.directions.take(members, axis=0)
+        half_width = self.half_width.take(members)
+        edges = edges_across(directions, half_width, judged, owner, to_light, TURNS, PLACES)
+        of_disc = cap_beyond(edges.height, half[:, None])
+        wrong = edges.beyond - held[:, None, TOTAL] * of_disc[..., None]
+        squared = np.einsum("ne,nek->nk", edges.part, wrong**2)
+        on_ground = disc_on_ground(to_light[:, 2], half)[:, None]
+        return squared + GROUND * (held[:, SEEN] - held[:, TOTAL] * on_ground) ** 2
+
+    def _nearest(self, cells: PatchCells, whole: Floats) -> Owner:
+        """The cell to which the distance of each patch is the least, (p,).
+
+        whole: light of each cell, (n,).
+        """
+        count = len(whole)
         scale = np.sqrt(whole / (2 * np.maximum(cells.shortfall, 1e-9)))
         # The squared chord, 2 - 2 cos, and how far a channel's mean lies aside of the cell's: both
         # linear in a patch's direction, so that one product of matrices holds them all.
         of_cells = [-2 * cells.to_light * scale[:, None], 2 * scale[:, None]]
-        for channel in (0, 2):
-            vector = _sums(cells.owner, self.weighted[channel], count)
+        for channel in PULLED:
+            vector = cells.held[:, VECTORS][:, 3 * channel : 3 * channel + 3]
             aside = vector - (vector * cells.to_light).sum(axis=1)[:, None] * cells.to_light
             aside *= (TOGETHER * scale / np.maximum(whole, 1e-300))[:, None]
             of_cells.append(aside)
@@ -244,34 +270,26 @@ class EdgeLight:
         for start in range(0, len(owner), at_once):
             some = slice(min(start, len(owner) - at_once), start + at_once)
             np.matmul(self.features[some], cell_parts, out=distances)
-            owner[some] = np.argmin(distances, axis=1)
-        stays = self.light > HEAVY * whole[cells.owner]
-        owner[stays] = cells.owner[stays]
+            np.argmin(distances, axis=1, out=owner[some])
         return owner
 
-    def _weight(self, members: Owner, owner: Owner, count: int) -> Floats:
-        """What each patch counts in its cell's mean direction: by the cell's own colour, as what
-        is little of a channel may lie anywhere."""
-        relative = self.relative[members]
-        shares = SEEN_BY * _sums(owner, relative, count)
-        return np.einsum("pc,pc->p", relative, shares[owner])
+    def _moments(self, held: Floats, members: Owner, owner: Owner) -> tuple[Floats, Floats]:
+        """Mean directions (n, 3) and shortfalls (n,) of cells; see `PatchCells`.
 
-    def _moments(self, members: Owner, owner: Owner, count: int) -> tuple[Floats, Floats]:
-        """Mean directions (n, 3) and shortfalls (n,) of cells; see `PatchCells`."""
-        directions, spread = self.patches.directions[members], self.patches.spread[members]
-        weight = self._weight(members, owner, count)
-        total = np.bincount(owner, weight, count)
-        # Each patch is as long as the mean of what it holds: sums are as over its pixels.
-        vector = _sums(owner, (weight * (1 - spread))[:, None] * directions, count)
+        What a patch counts is by its cell's own colour, as what is little of a channel may lie
+        anywhere. Each patch is as long as the mean of what it holds: sums are as over its pixels.
+        """
+        shares = SEEN_BY * held[:, RELATIVE]
+        total = (shares * held[:, RELATIVE]).sum(axis=1)
+        vector = np.einsum("nc,nca->na", shares, held[:, VECTORS].reshape(-1, 3, 3))
         length = np.linalg.norm(vector, axis=1)
         lost = length <= 1e-9 * total  # light from all sides
         to_light = vector / np.where(lost, 1, length)[:, None]
         for cell in np.flatnonzero(lost):
-            mine = np.flatnonzero(owner == cell)
-            to_light[cell] = directions[mine[np.argmax(weight[mine])]]
-        offset = directions - to_light[owner]
-        apart = (1 - spread) * np.einsum("pc,pc->p", offset, offset) / 2 + spread
-        return to_light, np.bincount(owner, weight * apart, count) / total
+            mine = members[owner == cell]
+            brightest = np.argmax(self.relative[mine] @ shares[cell])
+            to_light[cell] = self.patches.directions[mine[brightest]]
+        return to_light, np.maximum(1 - length / total, 0)
 
 
 def error_of(squared: Floats) -> float:
@@ -281,4 +299,8 @@ def error_of(squared: Floats) -> float:
 
 def _sums(owner: Owner, values: Floats, count: int) -> Floats:
     """Of each cell, (n, k), from values of pieces, (p, k)."""
-    return np.stack([np.bincount(owner, one, count) for one in values.T], axis=-1)
+    from scipy.sparse import csc_array
+
+    pieces = len(owner)
+    of_cells = csc_array((np.ones(pieces), owner, np.arange(pieces + 1)), shape=(count, pieces))
+    return of_cells @ values

@@ -8,15 +8,12 @@ the best end is taken.
 
 from __future__ import annotations
 
-import heapq
-from collections.abc import Callable, Iterator
-from itertools import count as counter
-
 import numpy as np
 
 from ..patches import Patches
 from ..settings import Shape
-from .edge_light import JUDGED, EdgeLight, Floats, Owner, PatchCells, error_of
+from .edge_cuts import Cuts
+from .edge_light import EdgeLight, PatchCells, error_of
 
 ROUNDS = 8, 8
 """How often borders are shared out before the cells are judged: three quarters of what can be won
@@ -25,91 +22,77 @@ comes with the first two times."""
 GO_ON = 2
 """Of the cells that were tried, how many go into another round."""
 
-ONE_IN = 8
-"""One in so many cells is cut at a time: the worst of many would be cut soon anyway."""
-
-Measure = Callable[[Owner, Owner, int], Floats]
-"""What is wrong of cells: `EdgeLight.squared_errors`, or like it."""
-
 
 def edge_split(patches: Patches, count: int, shape: Shape, allowed: float = 0.0) -> PatchCells:
     """At most `count` cells: as many as make the predicted error smaller, until it is `allowed`.
 
     patches: some, all of them lit. allowed: a part of all light; see `PatchCells.error`.
     """
-    whole = EdgeLight.of(patches, shape)
-    parts = whole.in_two_parts()
-    owner = _truest_cuts(parts, count, allowed)
-    enough = int(owner.max()) + 1
-    best = whole.judge(whole.cells(owner))
-    if enough == 1:
+    return split_of(patches, shape).cells(count, allowed)
+
+
+def split_of(patches: Patches, shape: Shape) -> EdgeSplit:
+    """The same one each time: cut for one number of cells, patches are cut for all smaller ones."""
+    return patches.once(("split", shape), lambda: EdgeSplit(patches, shape))
+
+
+class EdgeSplit:
+    """Patches that are cut into cells: asked for several numbers of cells, they are cut once.
+
+    patches: some, all of them lit.
+    """
+
+    def __init__(self, patches: Patches, shape: Shape) -> None:
+        whole = EdgeLight.of(patches, shape)
+        parts = whole.in_two_parts()
+        self.patches = patches
+        self._whole, self._truest = whole, Cuts(parts, parts.squared_errors)
+        lights = (whole,) if parts is whole else (whole, parts)
+        self._lights = [(light, Cuts(light, light.widths)) for light in lights]
+
+    def cells(self, count: int, allowed: float = 0.0) -> PatchCells:
+        """See `edge_split`."""
+        enough = self._enough(count, allowed)
+        owner = self._truest.owner(enough)
+        best = self._whole.judge(self._whole.cells(owner))
+        if enough == 1:
+            return best
+        tried = []
+        for light, widest in self._lights:
+            widest.grow(enough)
+            for cut in (owner, widest.owner(min(enough, widest.count))):
+                tried.append((light, light.cells(cut)))
+        for steps in ROUNDS:
+            tried = [(light, light.judge(_balanced(light, cells, steps))) for light, cells in tried]
+            tried.sort(key=lambda one: one[1].error)
+            best = min(best, tried[0][1], key=lambda cells: cells.error)
+            tried = tried[:GO_ON]
         return best
-    lights = (whole,) if parts is whole else (whole, parts)
-    tried = [
-        (light, light.cells(cut))
-        for light in lights
-        for cut in (owner, _widest_cuts(light, enough))
-    ]
-    for steps in ROUNDS:
-        tried = [(light, light.judge(_balanced(light, cells, steps))) for light, cells in tried]
-        tried.sort(key=lambda one: one[1].error)
-        best = min(best, tried[0][1], key=lambda cells: cells.error)
-        tried = tried[:GO_ON]
-    return best
 
+    def error_of_cuts(self, count: int) -> float:
+        """About what so many cells get wrong: before they are balanced; see `PatchCells.error`."""
+        self._truest.grow(count)
+        return error_of(self._truest.wrong[:count][-1])
 
-def _truest_cuts(light: EdgeLight, count: int, allowed: float) -> Owner:
-    best, least = np.zeros(0, np.intp), np.inf
-    for owner, squared in _cuts(light, count, light.squared_errors):
-        if squared.sum() < least:  # a round sun cut in two is two bad halves
-            best, least = owner.copy(), squared.sum()
-        if error_of(squared) <= allowed:
-            break
-    return best
-
-
-def _widest_cuts(light: EdgeLight, count: int) -> Owner:
-    for owner, _ in _cuts(light, count, light.widths):
-        last = owner
-    return last
-
-
-def _cuts(light: EdgeLight, count: int, measure: Measure) -> Iterator[tuple[Owner, Floats]]:
-    """One cell, two cells, ... up to `count`, at last a few more each time: the owner of each
-    patch, the same array each time, and the sum of what is measured, (JUDGED,)."""
-    owner = np.zeros(len(light.patches), np.intp)
-    order = counter()  # cells of equal badness in the order in which they were made
-    heap: list[tuple[float, int, int, Owner, Floats]] = []
-    total = np.zeros(JUDGED)
-
-    def add(made: list[tuple[int, Owner]]) -> None:
-        members = np.concatenate([some for _, some in made])
-        cell = np.repeat(np.arange(len(made)), [len(some) for _, some in made])
-        for (number, some), wrong in zip(made, measure(members, cell, len(made)), strict=True):
-            heapq.heappush(heap, (-wrong.sum(), next(order), number, some, wrong))
-            total[:] += wrong
-
-    add([(0, np.arange(len(owner)))])
-    cells = 1
-    yield owner, total
-    while heap and cells < count:
-        made: list[tuple[int, Owner]] = []
-        for _ in range(min(max(cells // ONE_IN, 1), count - cells, len(heap))):
-            _, _, number, members, wrong = heapq.heappop(heap)
-            first = light.halves(members)
-            if first is None:
-                continue
-            total -= wrong
-            owner[members[~first]] = cells
-            made += [(number, members[first]), (cells, members[~first])]
-            cells += 1
-        if made:
-            add(made)
-            yield owner, total
+    def _enough(self, count: int, allowed: float) -> int:
+        """With how many cells, before they are balanced, least is wrong, or little enough."""
+        self._truest.grow(count, allowed)
+        last = min(count, self._truest.count)
+        # Where only some of the worst are cut, the rest of them would be next.
+        numbers = np.array([*(end for end in self._truest.ends if end < last), last])
+        wrong = self._truest.wrong[numbers - 1]
+        within = np.sqrt(wrong.max(axis=1)) <= allowed
+        if within.any():
+            wrong = wrong[: np.argmax(within) + 1]
+        # A round sun cut in two is two bad halves.
+        return int(numbers[np.argmin(wrong.sum(axis=1))])
 
 
 def _balanced(light: EdgeLight, cells: PatchCells, steps: int) -> PatchCells:
-    """The cells after sharing out their borders so many times."""
+    """The cells after sharing out their borders so many times, or when nothing moves any more."""
     for _ in range(steps):
-        cells = light.cells(light.shared_out(cells))
+        owner = light.shared_out(cells)
+        if np.array_equal(owner, cells.owner):
+            break
+        cells = light.cells(owner)
     return cells

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import ceil, log
+from math import log
 
 from .placement import ChosenSuns
 
@@ -11,13 +11,24 @@ FALL = 1.1
 """The error falls about as the number of lights to this power, see docs/benchmarks/lights: a first
 guess, so that few numbers must be tried."""
 
+CAUTION = 2 / 3
+"""What is most wrong of too few lights falls faster than what is expected, by this power: level
+ground is at once right where no cell lies across the horizon any more."""
 
-def fewest(with_lights: Callable[[int], ChosenSuns], allowed: float, most: int) -> ChosenSuns:
-    """The fewest suns, at most `most`, that are wrong by at most `allowed`: `ChosenSuns.worst`.
 
+def fewest(
+    with_lights: Callable[[int], ChosenSuns],
+    allowed: float,
+    most: int,
+    expected: Callable[[int], float] = lambda count: count**-FALL,
+) -> ChosenSuns:
+    """About the fewest suns, at most `most`, that are wrong by at most `allowed`:
+    `ChosenSuns.worst`.
+
+    expected: about how wrong so many are; a guess, so that few numbers must be tried.
     Where even `most` are not enough, those that are least wrong of all that were tried. The error
-    need not fall evenly with the number; the next smaller number than is returned was tried too,
-    and is not enough.
+    need not fall evenly with the number; a number smaller by at most an eighth than is returned
+    was tried too, and is not enough: up to 15 lights that is the next smaller one.
     """
     tried: dict[int, ChosenSuns] = {}
 
@@ -26,12 +37,13 @@ def fewest(with_lights: Callable[[int], ChosenSuns], allowed: float, most: int) 
             tried[count] = with_lights(count)
         return tried[count].worst
 
-    low, high = 0, 1
+    low, high = 0, first_guess(allowed, most, expected)
     while error(high) > allowed:
         if high >= most:
             return min(tried.values(), key=lambda one: one.worst)
-        low, high = high, min(max(_guess(high, error(high), allowed), high + 1), most)
-    while high - low > 1:
+        aim = expected(high) * (allowed / error(high)) ** CAUTION
+        low, high = high, _guess(high + 1, aim, most, expected)
+    while high - low > max(high // 8, 1):
         middle = (low + high) // 2
         if low and error(low) > allowed > error(high) > 0:
             # On a line between the two, in logarithms, but well inside of them.
@@ -47,5 +59,13 @@ def fewest(with_lights: Callable[[int], ChosenSuns], allowed: float, most: int) 
     return tried[high]
 
 
-def _guess(count: int, error: float, allowed: float) -> int:
-    return ceil(count * min((error / allowed) ** (1 / FALL), 8.0))
+def first_guess(allowed: float, most: int, expected: Callable[[int], float]) -> int:
+    """The number of lights that `fewest` tries first."""
+    return _guess(1, allowed, most, expected)
+
+
+def _guess(least: int, aim: float, most: int, expected: Callable[[int], float]) -> int:
+    """The first number, from `least` up to `most`, that is expected to be no more wrong than `aim`;
+    not many times more than `least`."""
+    last = min(max(8 * least, 64), most)
+    return next((n for n in range(least, last) if expected(n) <= aim), last)
