@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from . import sphere
 from .errors import UnusableInput
 from .memo import Memo
-from .pixels import HeldPixels, Pixels, whole
+from .pixels import HeldPixels, Pixels, planes_of
 from .progress import Progress, silent
 from .reduction import LUMINANCE_WEIGHTS, Reduction, narrowed, reduced
 from .repairs import Repairs, repair
@@ -115,8 +115,10 @@ def environment_from_strips(
     _check_shape(pixels.width, pixels.height, name)
     width = working_width(pixels.width)
     if width == pixels.width:
-        radiance = whole(pixels)
-        environment = EnvironmentMap(radiance, name, file, repairs=repair(radiance))
+        planes = planes_of(next(pixels.strips(pixels.height)))
+        repairs = repair(planes)
+        radiance = np.stack([*planes], axis=-1)
+        environment = EnvironmentMap(radiance, name, file, repairs=repairs)
     else:
         made = reduced(pixels, width, progress)
         environment = EnvironmentMap(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
-from .pixels import Pixels, Planes, Strip, planes_of
+from .pixels import Pixels, Planes, Strip, highest_light, planes_of
 from .tolerances import HALF_MAXIMUM
 
 
@@ -42,13 +42,11 @@ class Repairs:
         )
 
 
-def repair(radiance: NDArray[np.float32]) -> Repairs:
-    """Repair a whole map, (height, width, 3), in place; see `repair_planes`."""
-    # min and max carry NaN along: one pass tells whether there is anything to do.
-    if np.isfinite(radiance.max()) and radiance.min() >= 0:
+def repair(planes: Planes) -> Repairs:
+    """Repair a whole map, (3, height, width), in place; see `repair_planes`."""
+    if not any(np.isnan(highest_light(plane)) for plane in planes):
         return Repairs()
-    planes = np.moveaxis(radiance, -1, 0)
-    solid = sphere.row_solid_angles(radiance.shape[1], radiance.shape[0])
+    solid = sphere.row_solid_angles(planes.shape[2], planes.shape[1])
     return repair_planes(planes, highest_finite(planes), solid)
 
 
@@ -67,18 +65,16 @@ def repair_planes(
     row, (rows,). halo: so many rows at the top and at the bottom are only there as neighbours: they
     are not counted.
     """
-    nan = np.isnan(planes)
-    infinite = np.isposinf(planes)
     negative = planes < 0
     own = slice(halo[0], planes.shape[1] - halo[1])
-    # Widened last: to widen a signalling NaN is an invalid operation.
-    lost = -np.where(np.isfinite(planes) & negative, planes, 0).astype(np.float64)
-    planes[negative] = 0
+    lost = np.where(planes >= -np.finfo(np.float32).max, np.minimum(planes, 0), 0)
+    np.maximum(planes, 0, out=planes)  # NaN stays
+    nan, infinite = np.isnan(planes), np.isposinf(planes)
     for channel in range(3):
         planes[channel][infinite[channel]] = max(highest[channel], HALF_MAXIMUM)
         _repair_nan(planes[channel], nan[channel])
     has_nan, has_inf, has_negative = (bad[:, own].any(axis=0) for bad in (nan, infinite, negative))
-    energy = lost[:, own].sum(axis=2) @ solid[own]
+    energy = -lost[:, own].sum(axis=2, dtype=np.float64) @ solid[own]
     return Repairs(
         nan=int(has_nan.sum()),
         infinite=int((has_inf & ~has_nan).sum()),

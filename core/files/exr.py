@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import sphere
-from ..environment import scalar_irradiance, working_width
+from ..environment import scalar_irradiance
 from ..errors import UnusableInput
 from ..pixels import HeldPixels, Pixels, Strip
 from ..reduction import narrowed, rows_of, total_light
@@ -42,8 +42,8 @@ Window = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 def read(path: Path) -> tuple[Pixels, list[str]]:
-    """A map's pixels, of the file's own type, and warnings for the user. Those of a wide map are
-    read a few rows at a time where its file allows.
+    """A map's pixels, of the file's own type, read a few rows at a time where the file allows, and
+    warnings for the user.
 
     `exr_layers` says which channels are taken. Raises UnusableInput.
     """
@@ -67,10 +67,9 @@ def _strips(path: Path, layer: Layer, header: Header) -> ExrPixels | None:
     cropped = "envmap" not in header and not np.array_equal(
         window, _window(header, "displayWindow")
     )
-    size = _size(window)
-    if working_width(size[0]) == size[0] or cropped:
+    if cropped:
         return None
-    return ExrPixels.of(path, layer.channels, size, int(window[0][1]))
+    return ExrPixels.of(path, layer.channels, _size(window), int(window[0][1]))
 
 
 def _read_headers(path: Path) -> list[Header]:

@@ -69,8 +69,10 @@ class ExrPixels:
     def _read(self, file: InputFile, top: int, bottom: int) -> Strip:
         try:
             with quiet_libraries() as remarks:
+                # Each once: a channel that is asked for again, as that of a grey map, is garbage.
+                names = sorted(set(self.channels))
                 stored = file.channels(
-                    self.channels, scanLine1=self.first + top, scanLine2=self.first + bottom - 1
+                    names, scanLine1=self.first + top, scanLine2=self.first + bottom - 1
                 )
         except MemoryError as error:
             raise too_large_for_memory(self.path.name, self.width, self.height) from error
@@ -81,7 +83,11 @@ class ExrPixels:
         guessed = "ojph" in remarks.getvalue()
         if guessed or any(len(one) != shape[0] * shape[1] * self.pixel.itemsize for one in stored):
             raise damaged_exr(self.path.name)
-        return tuple(np.frombuffer(one, self.pixel).reshape(shape) for one in stored)
+        planes = {
+            name: np.frombuffer(one, self.pixel).reshape(shape)
+            for name, one in zip(names, stored, strict=True)
+        }
+        return tuple(planes[name] for name in self.channels)
 
 
 def _is_unicode(path: Path) -> bool:

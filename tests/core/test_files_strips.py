@@ -96,6 +96,16 @@ def test_rows_of_an_hdr_are_those_of_the_whole(tmp_path, pixels):
     assert (np.concatenate(rows) == stored(path)).all()
 
 
+def test_rows_of_a_grey_map(tmp_path, pixels):
+    path = tmp_path / "map.exr"
+    grey = pixels[..., 0].copy()
+    with OpenEXR.File({"type": OpenEXR.scanlineimage}, {"Y": grey}) as file:
+        file.write(str(path))
+    found, _ = exr.read(path)
+    assert isinstance(found, strips.ExrPixels)
+    assert (whole(found) == grey[..., None]).all()
+
+
 def test_a_window_that_does_not_begin_at_0(tmp_path, pixels):
     """Of a map that says it is one, the data window is the map wherever it lies."""
     path = tmp_path / "map.exr"

@@ -112,8 +112,9 @@ def test_rows_are_repaired_as_a_whole_map_is(places, kind):
     pixels = noise(16).astype(kind)
     for place, value in places.items():
         pixels[place] = value
-    whole = pixels.astype(np.float32)
-    repairs = repair(whole)
+    planes = planes_of(tuple(np.moveaxis(pixels, -1, 0)))
+    repairs = repair(planes)
+    whole = np.moveaxis(planes, 0, -1)
     before = reduction.ROWS, reduction.PIXELS
     try:
         reduction.ROWS = reduction.PIXELS = 2
