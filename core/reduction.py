@@ -27,8 +27,9 @@ Floats = NDArray[np.float64]
 LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
 """Rec.709 luminance of linear RGB (ITU-R BT.709)."""
 
-ROWS = 256
-"""Read at a time, about: DWAB, the coarsest compression of OpenEXR, packs so many together."""
+ROWS = 512
+"""Read at a time, about: DWAB, the coarsest compression of OpenEXR, packs 256 together, and two such
+packs keep two cores busy."""
 
 NUMBERS = 1 << 16
 """That are copied and summed at a time, about."""

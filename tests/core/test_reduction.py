@@ -214,7 +214,10 @@ def test_every_half_float_is_copied_exactly():
     doubles = np.empty(halfs.shape)
     copy_as_float64(halfs, doubles)
     assert (doubles == halfs).all()
-    assert (planes_of((halfs, halfs, halfs)) == halfs).all()
+    for signed in (halfs, -halfs):
+        found = planes_of((signed, signed, signed))
+        assert (found == signed).all()
+        assert (np.signbit(found) == np.signbit(signed)).all()
     assert highest_light(halfs) == 65504
 
 
