@@ -57,6 +57,10 @@ class Cost:
         return self.whole / self.read
 
     @property
+    def ratio_to_oiio(self) -> float:
+        return self.whole / self.by_oiio
+
+    @property
     def memory_ratio(self) -> float:
         """Against the bytes of the map's pixels as float32 RGB."""
         return self.peak / (self.width**2 / 2 * 12)
@@ -181,27 +185,33 @@ def costs(
 
 
 def table(found: list[Cost]) -> list[str]:
-    """Medians of each size and kind of file over the maps: markdown."""
-    lines = [
-        "| width | file | OpenImageIO s | OpenEXR s | convert s | "
-        + " | ".join(STAGES)
-        + " | convert / reading | memory MB | memory / float32 pixels |",
-        "| " + "--- | " * (8 + len(STAGES)),
-    ]
+    """Of each size and kind of file, over the maps: markdown."""
+    heads = ("width", "file", "OpenImageIO s", "OpenEXR s", "convert s", *STAGES)
+    heads += ("convert / OpenImageIO", "convert / faster", "memory MB", "memory / float32 pixels")
+    lines = ["| " + " | ".join(heads) + " |", "| " + "--- | " * len(heads)]
     for width in sorted({one.width for one in found}):
         for kind in dict.fromkeys(one.kind for one in found if one.width == width):
             same = [one for one in found if (one.width, one.kind) == (width, kind)]
-            stages = [median(one.stages[name] for one in same) for name in STAGES]
             exr = median(one.by_openexr for one in same)
+            seconds_of = [
+                f"{median(one.by_oiio for one in same):.3f}",
+                f"{exr:.3f}" if exr else "",
+                f"{median(one.whole for one in same):.3f}",
+                *(f"{median(one.stages[name] for one in same):.3f}" for name in STAGES),
+            ]
+            ratios = [
+                f"{geometric_mean(values):.2f} ({max(values):.2f})"
+                for values in (
+                    [one.ratio_to_oiio for one in same],
+                    [one.ratio for one in same],
+                )
+            ]
+            memory = [
+                f"{max(one.peak for one in same) / 1e6:.0f}",
+                f"{max(one.memory_ratio for one in same):.2f}",
+            ]
             lines.append(
-                f"| {width} | {kind} | {median(one.by_oiio for one in same):.3f} | "
-                + (f"{exr:.3f}" if exr else "")
-                + f" | {median(one.whole for one in same):.3f} | "
-                + " | ".join(f"{one:.3f}" for one in stages)
-                + f" | {geometric_mean(one.ratio for one in same):.2f} "
-                f"({max(one.ratio for one in same):.2f}) | "
-                f"{max(one.peak for one in same) / 1e6:.0f} | "
-                f"{max(one.memory_ratio for one in same):.2f} |"
+                "| " + " | ".join([str(width), kind, *seconds_of, *ratios, *memory]) + " |"
             )
     return lines
 
@@ -230,7 +240,7 @@ def plot(found: list[Cost], by_lights: dict[str, float], path: Path) -> None:
     level = median(one.whole for one in first)
     left.plot([start, most], [level, level * most / start], "k--", lw=1, label="linear in pixels")
     left.set(xscale="log", yscale="log", xlabel="million pixels", ylabel="seconds")
-    left.legend(fontsize=7)
+    left.legend(fontsize=7, loc="lower right")
     right.plot([int(n) for n in by_lights], list(by_lights.values()), "o-")
     right.set(xscale="log", xlabel="lights asked for", ylabel="seconds of a whole conversion")
     right.set_ylim(bottom=0)
@@ -239,7 +249,6 @@ def plot(found: list[Cost], by_lights: dict[str, float], path: Path) -> None:
 
 def run(maps: list[Path], out: Path, widths: list[int], kinds: list[Kind], repeat: int) -> None:
     """Measure, and write a table and a plot."""
-    out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         found = []
         for cost in costs(maps, widths, kinds, repeat, Path(folder)):
@@ -252,16 +261,24 @@ def run(maps: list[Path], out: Path, widths: list[int], kinds: list[Kind], repea
         middle = Path(folder) / "lights.exr"
         make(maps[0], min(4096, max(widths)), KINDS[1], middle)
         by_lights = in_a_process("lights", middle, repeat)
+    report(found, by_lights, min(4096, max(widths)), out)
+
+
+def report(found: list[Cost], by_lights: dict[str, float], width: int, out: Path) -> None:
+    """Figures, table and plot. by_lights: seconds of the first map, so wide, for each number."""
+    out.mkdir(parents=True, exist_ok=True)
     (out / "conversion.json").write_text(
         json.dumps([asdict(one) for one in found], indent=1) + "\n", encoding="utf-8"
     )
     lines = [
-        "Ratios: geometric mean over the maps (worst map); reading by the faster library.",
+        "Medians of interleaved runs; ratios: geometric mean over the maps (worst map), to reading "
+        "by OpenImageIO and by the faster library.",
         "",
         *table(found),
         "",
-        f"Seconds of a whole conversion of {maps[0].stem}, {min(4096, max(widths))} wide, by lights"
-        " asked for: " + ", ".join(f"{n}: {s:.2f}" for n, s in by_lights.items()) + ".",
+        f"Seconds of a whole conversion of {found[0].name}, {width} wide, by lights asked for: "
+        + ", ".join(f"{n}: {s:.2f}" for n, s in by_lights.items())
+        + ".",
         "",
     ]
     (out / "conversion.md").write_text("\n".join(lines), encoding="utf-8")
