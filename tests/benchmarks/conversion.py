@@ -240,7 +240,7 @@ def plot(found: list[Cost], by_lights: dict[str, float], path: Path) -> None:
     level = median(one.whole for one in first)
     left.plot([start, most], [level, level * most / start], "k--", lw=1, label="linear in pixels")
     left.set(xscale="log", yscale="log", xlabel="million pixels", ylabel="seconds")
-    left.legend(fontsize=7, loc="lower right")
+    figure.legend(fontsize=7, loc="outside left upper")
     right.plot([int(n) for n in by_lights], list(by_lights.values()), "o-")
     right.set(xscale="log", xlabel="lights asked for", ylabel="seconds of a whole conversion")
     right.set_ylim(bottom=0)
