@@ -28,7 +28,7 @@ LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
 """Rec.709 luminance of linear RGB (ITU-R BT.709)."""
 
 ROWS = 512
-"""Read at a time, about: DWAB, the coarsest compression of OpenEXR, packs 256 together, and two such
+"""Read at a time, about: DWAB, the coarsest compression of OpenEXR, packs 256 together, and two
 packs keep two cores busy."""
 
 NUMBERS = 1 << 16

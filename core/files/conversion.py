@@ -14,7 +14,6 @@ from ..errors import UnusableInput
 from . import exr, lights_json, samples_json
 from .atomic import written_together
 from .belonging import read_named, read_together, sha256
-from .preview import draw_preview
 
 ENDINGS = {
     "residual": "residual.exr",
@@ -92,6 +91,8 @@ def _write(conversion: Conversion, drafts: dict[str, Path]) -> None:
         samples_json.write(drafts["samples"], conversion.samples, document["residual"])
         document["residual"]["samples_sha256"] = sha256(drafts["samples"])
     if "preview" in drafts:
+        from .preview import draw_preview  # and Pillow with it
+
         draw_preview(conversion).save(drafts["preview"])
     lights_json.write(drafts["lights"], document)
 
