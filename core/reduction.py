@@ -31,6 +31,9 @@ ROWS = 512
 """Read at a time, about: DWAB, the coarsest compression of OpenEXR, packs 256 together, and two
 packs keep two cores busy."""
 
+FEWER_ROWS = 256
+"""The same where one core works on them, and needs several copies."""
+
 NUMBERS = 1 << 16
 """That are copied and summed at a time, about."""
 
@@ -96,7 +99,7 @@ def narrowed(pixels: Pixels, width: int) -> NDArray[np.float32]:
 def rows_of(pixels: Pixels, step: int = 1) -> int:
     """To read at a time: a multiple of `step`."""
     least = int(np.lcm(step, pixels.least_rows))
-    return least * max(round(ROWS / least), 1)
+    return least * max(round(FEWER_ROWS / least), 1)
 
 
 def total_light(strip: Strip, solid: Floats) -> Floats:

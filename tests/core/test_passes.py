@@ -120,7 +120,10 @@ def test_parts_of_a_conversion():
     paint_disc(pixels, direction(-120, 20), 3, (50, 60, 70))
     made = convert(environment(pixels), ConversionSettings(lights=2))
     suns, residual = parts_of(made, by_strength=True)
-    light = float(made.account.source @ LUMINANCE_WEIGHTS)
+    # The same light as the account's, added up in another order.
+    light, share = made.strata.light, made.visible_share
+    assert light == pytest.approx(made.account.source @ LUMINANCE_WEIGHTS, rel=1e-14)
+    assert share == pytest.approx(made.account.share, rel=1e-14)
     assert suns == part_of_suns(made.suns, light, by_strength=True)
-    assert residual == part_of_residual(made.residual, made.account.share)
+    assert residual == part_of_residual(made.residual, share)
     assert suns.variance < parts_of(made, by_strength=False)[0].variance
