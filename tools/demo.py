@@ -20,6 +20,7 @@ from PIL import Image, ImageDraw, ImageFont
 import sunsplit
 from sunsplit.core.cli import main as sunsplit_command
 from sunsplit.core.files import exr
+from sunsplit.core.pixels import whole
 
 SAMPLES = Path(__file__).resolve().parent.parent / "sample_scenes"
 
@@ -92,7 +93,7 @@ def render(scene: bpy.types.Scene, path: Path) -> tuple[np.ndarray, float]:
     seconds = time.perf_counter() - started
     settings.file_format, settings.color_depth = "PNG", "8"
     bpy.data.images["Render Result"].save_render(str(path.with_suffix(".png")), scene=scene)
-    return exr.read(path.with_suffix(".exr"))[0].astype(np.float64), seconds
+    return whole(exr.read(path.with_suffix(".exr"))[0]).astype(np.float64), seconds
 
 
 def side_by_side(folder: Path, before: np.ndarray, after: np.ndarray) -> Image.Image:
