@@ -52,7 +52,12 @@ def read_named(file: Path, stated: str | None, by: str, read: Callable[[Path], R
     try:
         before = _identity(file)
         same = stated is None or sha256(file) == stated
-        content = read(file) if same else None
+        try:
+            content = read(file) if same else None
+        except UnusableInput:
+            if _identity(file) == before:
+                raise
+            same = False
         same = same and _identity(file) == before  # else it was replaced under our eyes
     except FileNotFoundError as error:
         raise NotTogether(f"{file} is missing: convert the map again.") from error

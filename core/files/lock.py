@@ -101,8 +101,11 @@ def locked(path: Path, patience: float = PATIENCE) -> Iterator[None]:
 
 
 def _taken(path: Path) -> BinaryIO | None:
-    path.parent.mkdir(exist_ok=True)
+    folder = path.parent
     try:
+        folder.mkdir(exist_ok=True)
         return take(path)
-    except FileNotFoundError:  # another one has removed the folder between these two lines
-        return None
+    except (FileNotFoundError, FileExistsError):
+        if folder.is_file() or folder.is_symlink() or not folder.parent.is_dir():
+            raise
+        return None  # another one has removed the folder between two of these steps
