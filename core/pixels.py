@@ -32,7 +32,7 @@ class Pixels(Protocol):
 
     def strips(self, rows: int) -> Iterator[Strip]:
         """From the top, so many rows at a time (fewer at the end): red, green and blue,
-        (rows, width) each, half or float32."""
+        (rows, width) each, of any type of number."""
         ...
 
 

@@ -37,10 +37,10 @@ FEWER_ROWS = 256
 NUMBERS = 1 << 16
 """That are copied and summed at a time, about."""
 
-NONE = Repairs()
-
 PIXELS = 1 << 20
 """In the hands of one thread at a time, about."""
+
+NOTHING_REPAIRED = Repairs()
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class Reduction:
 def reduced(raw: Pixels, width: int, progress: Progress = silent) -> Reduction:
     """Narrow a map to a width that is a whole part of its own."""
     sums = _BlockSums(raw.width, raw.height, raw.width // width)
-    highest, repairs, left_out = np.zeros(3, np.float32), Repairs(), set()
+    highest, repairs, left_out = np.zeros(3, np.float32), NOTHING_REPAIRED, set()
     for top, found in _on_all_cores(sums, raw, progress):
         highest = np.maximum(highest, found.highest)
         repairs += found.repairs
@@ -134,7 +134,7 @@ class _Found:
     they were left out, as that takes more than these rows."""
 
     highest: NDArray[np.float32]
-    repairs: Repairs = NONE
+    repairs: Repairs = NOTHING_REPAIRED
     left_out: bool = False
 
 
