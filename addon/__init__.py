@@ -5,7 +5,7 @@ import sys
 
 import bpy
 
-from . import command, operators, panel, properties
+from . import command, operators, panel, presets, properties
 
 CLASSES = (
     properties.SunsplitLamp,
@@ -13,8 +13,18 @@ CLASSES = (
     properties.SunsplitSettings,
     operators.SUNSPLIT_OT_convert,
     operators.SUNSPLIT_OT_restore,
+    operators.SUNSPLIT_OT_reset_factors,
+    operators.SUNSPLIT_OT_select_suns,
+    presets.SUNSPLIT_OT_add_preset,
+    panel.SUNSPLIT_PT_presets,
     panel.SUNSPLIT_PT_main,
+    panel.SUNSPLIT_PT_suns,
     panel.SUNSPLIT_PT_settings,
+    panel.SUNSPLIT_PT_advanced,
+    panel.SUNSPLIT_PT_world,
+    panel.SUNSPLIT_PT_world_suns,
+    panel.SUNSPLIT_PT_world_settings,
+    panel.SUNSPLIT_PT_world_advanced,
 )
 
 
@@ -23,6 +33,7 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.types.Scene.sunsplit = bpy.props.PointerProperty(type=properties.SunsplitSettings)
     command.register()
+    presets.register()
     # Blender unregisters its add-ons when it ends. As a Python module it does not, and 4.5 then
     # hangs or crashes over any operator or panel that is left.
     if not bpy.app.binary_path:
@@ -33,6 +44,7 @@ def unregister() -> None:
     atexit.unregister(unregister)
     if not hasattr(bpy.types.Scene, "sunsplit"):
         return  # Blender disables an extension when it ends, after what `register` has asked for.
+    presets.unregister()
     command.unregister()
     del bpy.types.Scene.sunsplit
     for cls in reversed(CLASSES):

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ..core.environment import LUMINANCE_WEIGHTS
 from ..core.suns import Sun
+from .controls import SOFTNESS, STRENGTH, WARMTH
 from .driven import Formula
-from .rig import SKY, SOFTNESS, STRENGTH, WARMTH, Rig, rig_of
+from .rig import SKY, Rig, rig_of
 from .trace import TAG, constant
 from .world import WorldLight
 
@@ -176,3 +177,28 @@ def _move_out(
     for child in collection.children:
         if child.name not in scene.collection.children:
             scene.collection.children.link(child)
+
+
+def suns_that_are(
+    state: bpy.types.PropertyGroup, which: str, limit: float
+) -> list[bpy.types.Object]:
+    """Lamps of a conversion, the brightest first: "all", the "brightest", or those that are "sharp"
+    or "soft", narrower than a limit in radians or not."""
+    lamps = [entry.lamp for entry in state.lamps if entry.lamp]
+    if which == "brightest":
+        return lamps[:1]
+    if which in ("sharp", "soft"):
+        return [lamp for lamp in lamps if (lamp.data.angle < limit) == (which == "sharp")]
+    return lamps
+
+
+def select_lamps(context: bpy.types.Context, lamps: Sequence[bpy.types.Object]) -> None:
+    """Select these lamps and nothing else, the first of them the active one."""
+    shown = context.view_layer.objects
+    for thing in shown.selected:
+        thing.select_set(False)
+    lamps = [lamp for lamp in lamps if lamp.name in shown]
+    for lamp in lamps:
+        lamp.select_set(True)
+    if lamps:
+        shown.active = lamps[0]

@@ -1,9 +1,24 @@
 """Operators: read the settings, call a plain function, report. A few lines each."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import bpy
+from bpy.props import EnumProperty, FloatProperty
 
 from ..core.errors import SunsplitError
 from .properties import CHOICES
+
+if TYPE_CHECKING:
+    from .jobs import Job
+
+NAVIGATION = {
+    *("MOUSEMOVE", "INBETWEEN_MOUSEMOVE", "MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE"),
+    *("TRACKPADPAN", "TRACKPADZOOM", "MOUSEROTATE", "WINDOW_DEACTIVATE", "NDOF_MOTION"),
+    *("TIMER_REPORT", "TIMER_REGION", "TIMER0", "TIMER1", "TIMER2", "TIMER_JOBS"),
+}
+"""What the window may do while a conversion is on its way: it must not change the scene."""
 
 
 class SUNSPLIT_OT_convert(bpy.types.Operator):
@@ -23,25 +38,82 @@ class SUNSPLIT_OT_convert(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        """All at once, as scripts want it."""
         from .scene import convert_scene, options_for, settings_for
+        from .words import progress
 
         chosen = self._chosen(context.scene.sunsplit)
+        settings, options = settings_for(chosen), options_for(chosen)
         try:
-            result = convert_scene(context.scene, settings_for(chosen), options_for(chosen))
+            result = convert_scene(context.scene, settings, options, progress())
         except SunsplitError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        for name, value in chosen.items():
-            setattr(context.scene.sunsplit, name, value)
-            setattr(self, name, value)  # Adjust Last Operation shows what was used
-        self.report({"INFO"}, result.headline)
-        return {"FINISHED"}
+        return self._done(context, result.headline)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Beside the window, with progress, until it is done or Esc is pressed."""
+        if bpy.app.background:
+            return self.execute(context)
+        from .jobs import TICK, Job
+        from .scene import conversion_steps, options_for, settings_for
+
+        if Job.running:
+            self.report({"WARNING"}, "A conversion is on its way: Esc stops it.")
+            return {"CANCELLED"}
+        chosen = self._chosen(context.scene.sunsplit)
+        try:
+            settings, options = settings_for(chosen), options_for(chosen)
+        except SunsplitError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self._job: Job = Job(conversion_steps(context.scene, settings, options))
+        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        from .words import show_progress
+
+        job = self._job
+        if event.type == "ESC" and event.value == "PRESS":
+            job.cancel()
+        elif event.type != "TIMER":
+            return {"PASS_THROUGH"} if event.type in NAVIGATION else {"RUNNING_MODAL"}
+        if not job.is_cancelled and not job.advance():
+            show_progress(context, job)
+            return {"RUNNING_MODAL"}
+        self.cancel(context)
+        if job.is_cancelled:
+            self.report({"INFO"}, "Conversion cancelled: the scene is as it was")
+            return {"CANCELLED"}
+        if job.error is not None:
+            if not isinstance(job.error, SunsplitError):
+                raise job.error
+            self.report({"ERROR"}, str(job.error))
+            return {"CANCELLED"}
+        return self._done(context, job.result.headline)
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Blender calls this, too, when the window goes away."""
+        from .words import show_progress
+
+        self._job.cancel()
+        context.window_manager.event_timer_remove(self._timer)
+        show_progress(context, None)
 
     def draw(self, context: bpy.types.Context) -> None:
         from .panel import draw_settings
 
         self.layout.use_property_split = True
         draw_settings(self.layout, self)
+
+    def _done(self, context: bpy.types.Context, headline: str) -> set[str]:
+        for name, value in self._chosen(context.scene.sunsplit).items():
+            setattr(context.scene.sunsplit, name, value)
+            setattr(self, name, value)  # Adjust Last Operation shows what was used
+        self.report({"INFO"}, headline)
+        return {"FINISHED"}
 
     def _chosen(self, scene_settings: bpy.types.PropertyGroup) -> dict[str, object]:
         """The scene's settings, and before them what was given as an argument."""
@@ -63,13 +135,81 @@ class SUNSPLIT_OT_restore(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not context.scene.sunsplit.is_converted:
-            cls.poll_message_set("This scene's world is not converted")
-            return False
-        return True
+        return _is_converted(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from .scene import restore_scene
 
         restore_scene(context.scene)
         return {"FINISHED"}
+
+
+class SUNSPLIT_OT_reset_factors(bpy.types.Operator):
+    """Set strength, warmth and softness of all suns back to what was measured"""
+
+    bl_idname = "sunsplit.reset_factors"
+    bl_label = "As Measured"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.scene.sunsplit.sky is None:
+            cls.poll_message_set("There are no suns to reset: convert the world first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        from .controls import reset_factors
+
+        reset_factors(context.scene.sunsplit.sky)
+        return {"FINISHED"}
+
+
+class SUNSPLIT_OT_select_suns(bpy.types.Operator):
+    """Select sun lamps by how much light they give or how wide they are"""
+
+    bl_idname = "sunsplit.select_suns"
+    bl_label = "Select Suns"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    __annotations__ = {
+        "which": EnumProperty(
+            name="Which",
+            items=[
+                ("all", "All", "All suns"),
+                ("brightest", "Brightest", "The one that gives most light"),
+                ("sharp", "Sharp", "Narrower than the limit: hard shadows"),
+                ("soft", "Soft", "As wide as the limit or wider: soft shadows"),
+            ],
+        ),
+        "limit": FloatProperty(
+            name="Limit",
+            description="Angular diameter between sharp and soft suns",
+            subtype="ANGLE",
+            default=0.0872664626,  # 5 degrees
+            min=0.0,
+            max=3.14159265,
+        ),
+    }
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Suns are selected in Object Mode")
+            return False
+        return _is_converted(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        from .lamps import select_lamps, suns_that_are
+
+        found = suns_that_are(context.scene.sunsplit, self.which, self.limit)
+        select_lamps(context, found)
+        self.report({"INFO"}, f"{len(found)} selected")
+        return {"FINISHED"} if found else {"CANCELLED"}
+
+
+def _is_converted(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    if not context.scene.sunsplit.is_converted:
+        operator.poll_message_set("This scene's world is not converted")
+        return False
+    return True

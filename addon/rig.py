@@ -14,30 +14,12 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from .controls import FACTORS
 from .driven import Formula
 from .mapping import Matrix3, Rotation, turns
 from .trace import TAG, Input, Place, constant
 
 SKY = "Sunsplit Sky"
-
-
-@dataclass(frozen=True)
-class Factor:
-    """A property of the outermost empty that changes all lamps; neutral: as measured."""
-
-    name: str
-    neutral: float
-    least: float
-    most: float
-    description: str
-
-
-STRENGTH = Factor("strength", 1.0, 0.0, 4.0, "Of all suns, times what was measured")
-WARMTH = Factor(
-    "warmth", 0.0, -1.0, 1.0, "Of all suns: 0 as measured, 1 like a lamp of 3000 K, -1 like the sky"
-)
-SOFTNESS = Factor("softness", 1.0, 0.0, 10.0, "Width of all suns, times what was measured")
-FACTORS = (STRENGTH, WARMTH, SOFTNESS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,26 +132,3 @@ def remove_rig(sky: bpy.types.Object | None, lamps: Sequence[bpy.types.Object]) 
             child.matrix_world = where
     for empty in empties:
         bpy.data.objects.remove(empty)
-
-
-def rotation_control(sky: bpy.types.Object | None) -> tuple[bpy.types.NodeSocket, int] | None:
-    """The input that turns the map about the vertical, and which component of it; None where no
-    single input does."""
-    if sky is None or sky.animation_data is None:
-        return None
-    for curve in sky.animation_data.drivers:
-        variables = curve.driver.variables
-        vertical = curve.data_path == "rotation_euler" and curve.array_index == 2
-        if (vertical or curve.data_path == "rotation_axis_angle") and len(variables) == 1:
-            target = variables[0].targets[0]
-            return _resolved(target.id, target.data_path)
-    return None
-
-
-def _resolved(owner: bpy.types.ID, path: str) -> tuple[bpy.types.NodeSocket, int] | None:
-    socket_path, _, index = path.partition(".default_value")
-    try:
-        socket = owner.path_resolve(socket_path)
-    except ValueError:  # the user has taken the node away
-        return None
-    return socket, int(index.strip("[]")) if index else -1

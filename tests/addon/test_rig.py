@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sunsplit.addon.rig import rotation_control
+from sunsplit.addon.controls import rotation_control
 from sunsplit.addon.world import find_light
 from tests.blender import add_mapping, fresh_scene, hdri_world, node, suns, to_light, write_map
 from tests.maps import direction, paint_disc, sky
