@@ -51,18 +51,29 @@ def changed_factors(sky: bpy.types.Object) -> list[str]:
     return [factor.name for factor in FACTORS if sky.get(factor.name) != factor.neutral]
 
 
-def rotation_control(sky: bpy.types.Object | None) -> tuple[bpy.types.NodeSocket, int] | None:
-    """The input that turns the map about the vertical, and which component of it; None where no
-    single input does."""
-    if sky is None or sky.animation_data is None:
-        return None
-    for curve in sky.animation_data.drivers:
-        variables = curve.driver.variables
-        vertical = curve.data_path == "rotation_euler" and curve.array_index == 2
-        if (vertical or curve.data_path == "rotation_axis_angle") and len(variables) == 1:
-            target = variables[0].targets[0]
-            return _resolved(target.id, target.data_path)
+def rotation_control(settings: bpy.types.PropertyGroup) -> tuple[bpy.types.NodeSocket, int] | None:
+    """The input that turns the map of a conversion, and its lamps, about the vertical, and which
+    component of it; None where no single input does."""
+    for empty in _rig_of(settings):
+        for curve in empty.animation_data.drivers if empty.animation_data else ():
+            variables = curve.driver.variables
+            vertical = curve.data_path == "rotation_euler" and curve.array_index == 2
+            if (vertical or curve.data_path == "rotation_axis_angle") and len(variables) == 1:
+                target = variables[0].targets[0]
+                return _resolved(target.id, target.data_path)
     return None
+
+
+def _rig_of(settings: bpy.types.PropertyGroup) -> list[bpy.types.Object]:
+    """The empties that hold a conversion's lamps, the outermost first; without a lamp only that.
+    This way round it takes no time, as to ask for children does."""
+    lamp = next((entry.lamp for entry in settings.lamps if entry.lamp), None)
+    if lamp is None:
+        return [settings.sky] if settings.sky else []
+    found = [lamp]
+    while found[0].parent is not None:
+        found.insert(0, found[0].parent)
+    return found[:-1]
 
 
 def _resolved(owner: bpy.types.ID, path: str) -> tuple[bpy.types.NodeSocket, int] | None:

@@ -59,15 +59,14 @@ class _Suns:
         return context.scene.sunsplit.sky is not None and not Job.running
 
     def draw(self, context: bpy.types.Context) -> None:
-        sky = context.scene.sunsplit.sky
-        layout = self.layout
+        settings = context.scene.sunsplit
+        sky, layout = settings.sky, self.layout
         layout.use_property_split = True
-        _draw_rotation(layout, sky)
+        _draw_rotation(layout, settings)
         for factor in FACTORS:
             layout.prop(sky, f'["{factor.name}"]', text=factor.label, slider=True)
         _draw_state(layout, sky)
-        lamps = len(context.scene.sunsplit.lamps)
-        if lamps > 1:
+        if len(settings.lamps) > 1:
             row = layout.row(align=True)
             row.label(text="Select")
             for which in ("all", "brightest", "sharp", "soft"):
@@ -153,9 +152,9 @@ def _draw_report(layout: bpy.types.UILayout, report: str, characters: int) -> No
             box.label(text=line, icon="LIGHT_SUN" if number == part == 0 else "NONE")
 
 
-def _draw_rotation(layout: bpy.types.UILayout, sky: bpy.types.Object) -> None:
+def _draw_rotation(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     """The input of the world that turns the map, and with it the lamps."""
-    control = rotation_control(sky)
+    control = rotation_control(settings)
     if control is None:
         layout.label(text="The world's nodes turn map and suns", icon="INFO")
         return

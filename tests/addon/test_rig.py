@@ -173,12 +173,12 @@ def test_a_world_without_a_mapping_gets_one_that_stays(scene, two_suns):
     hdri_world(scene, two_suns)
     original = scene.world
     bpy.ops.sunsplit.convert()
-    socket, component = rotation_control(scene.sunsplit.sky)
+    socket, component = rotation_control(scene.sunsplit)
     in_map = directions_in_map(scene)
     socket.default_value[component] = 1.0
     assert_lamps_are_where_the_map_shows_them(scene, in_map)
     bpy.ops.sunsplit.convert()
-    socket, component = rotation_control(scene.sunsplit.sky)
+    socket, component = rotation_control(scene.sunsplit)
     assert socket.default_value[component] == 1.0
     assert len([n for n in scene.world.node_tree.nodes if n.type == "MAPPING"]) == 1
     assert_lamps_are_where_the_map_shows_them(scene, in_map)
