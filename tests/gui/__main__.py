@@ -8,7 +8,7 @@ The extension is built from the clone as it is. `--map FILE.hdr` lights the scen
 At the prompt, or in a script:
 
     window.press("sunsplit.convert")
-    window.wait_for("state()['converted']")
+    window.wait_for("is_converted()")
     window.ask("[lamp.name for lamp in bpy.data.lights]")     # what inside.py knows
     window.picture().save("seen.png")
 """
@@ -44,7 +44,7 @@ def main() -> None:
 def save_panel(window: Window, path: Path) -> None:
     """The panel after a conversion, for README."""
     window.press("sunsplit.convert")
-    window.wait_for("state()['converted']", 300)
+    window.wait_for("is_converted()", 300)
     window.panel_picture().save(path)
 
 

@@ -43,6 +43,8 @@ def sid() -> Debian:
 def opened(sid: Debian, sunrise: Path) -> Iterator[Window]:
     with session(sid, sunrise) as window:
         yield window
+        window.quit()
+        assert not complaints(window.console())
 
 
 @pytest.fixture(scope="session")

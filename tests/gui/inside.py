@@ -109,10 +109,8 @@ def timed_start() -> list[float]:
 
 def new_scene() -> None:
     """Surfaces under a real HDRI, saved and opened: with nothing to undo."""
-    bpy.ops.wm.read_homefile(use_factory_startup=True, load_ui=False, use_splash=False)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     with bpy.context.temp_override(window=window()):
-        bpy.ops.object.select_all(action="SELECT")
-        bpy.ops.object.delete()
         add = bpy.ops.mesh
         add.primitive_plane_add(size=12)
         add.primitive_cube_add(size=1.4, location=(-1.6, 0.4, 0.7))
@@ -124,18 +122,19 @@ def new_scene() -> None:
     scene = bpy.context.scene
     scene.camera = bpy.data.objects["Camera"]
     scene.render.engine = "CYCLES"
-    light_by(FOLDER / "sky.hdr")
+    scene.world = bpy.data.worlds.new("World")
+    light_by("sky.hdr")
     save_scene("scene.blend")
     open_scene("scene.blend")
 
 
-def light_by(path: Path) -> None:
-    """Give the scene's world a map."""
+def light_by(name: str) -> None:
+    """Give the scene's world a map that lies in the folder."""
     tree = bpy.context.scene.world.node_tree
-    texture = tree.nodes.new("ShaderNodeTexEnvironment")
-    texture.image = bpy.data.images.load(str(path))
-    background = next(node for node in tree.nodes if node.type == "BACKGROUND")
-    tree.links.new(texture.outputs["Color"], background.inputs["Color"])
+    found = {node.type: node for node in tree.nodes}
+    texture = found.get("TEX_ENVIRONMENT") or tree.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = bpy.data.images.load(str(FOLDER / name))
+    tree.links.new(texture.outputs["Color"], found["BACKGROUND"].inputs["Color"])
 
 
 def save_scene(name: str) -> None:
@@ -164,7 +163,7 @@ def state() -> dict[str, object]:
         "world": scene.world.name if scene.world else None,
         "nodes": nodes(scene.world),
         "lamps": [one.name for one in scene.objects if one.type == "LIGHT"],
-        "converted": settings.is_converted,
+        "converted": is_converted(),
         "report": settings.report,
         "blocks": blocks(),
     }
@@ -197,14 +196,14 @@ def reports() -> list[str]:
     manager = bpy.context.window_manager
     manager.clipboard = ""
     area = next(area for area in window().screen.areas if area.type == "DOPESHEET_EDITOR")
-    area.type = "INFO"
+    kind, area.ui_type = area.ui_type, "INFO"
     try:
         with bpy.context.temp_override(window=window(), area=area, region=area.regions[-1]):
             bpy.ops.info.select_all(action="SELECT")
             bpy.ops.info.report_copy()
             bpy.ops.info.select_all(action="DESELECT")
     finally:
-        area.type = "DOPESHEET_EDITOR"
+        area.ui_type = kind
     return manager.clipboard.splitlines()
 
 
@@ -236,6 +235,10 @@ def category() -> str:
     return region("UI").active_panel_category if view().spaces.active.show_region_ui else ""
 
 
+def is_converted() -> bool:
+    return bpy.context.scene.sunsplit.is_converted
+
+
 def hovered() -> str:
     """What the button of the sidebar under the mouse does: an operator, or a property's path.
 
@@ -251,35 +254,32 @@ def hovered() -> str:
     return manager.clipboard.removeprefix("bpy.ops.").partition("(")[0]
 
 
-def timed_draws(times: int) -> list[float]:
-    """Milliseconds that the extension's panels in view spend in each of so many redraws."""
-    panels = [cls for cls in bpy.types.Panel.__subclasses__() if cls.__module__.startswith(MODULE)]
-    spent: list[float] = []
-    draws = {cls: cls.draw for cls in panels}
-    found = []
-    for cls in panels:
-        cls.draw = timed(cls.draw, spent)
-    try:
-        for _ in range(times):
-            spent.clear()
-            with bpy.context.temp_override(window=window(), area=view(), region=region("UI")):
-                bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
-            found.append(sum(spent))
-    finally:
-        for cls, draw in draws.items():
-            cls.draw = draw
-    return found
+SPENT: list[float] = []
+"""Milliseconds of each panel that the sidebar has drawn since the last look."""
 
 
-def timed(work: Callable, spent: list[float]) -> Callable:
-    """A function that also appends the milliseconds of each call."""
+def time_panels() -> None:
+    """From now on, keep the time of each of the extension's panels that is drawn."""
+    for cls in bpy.types.Panel.__subclasses__():
+        if cls.__module__.startswith(MODULE):
+            cls.draw = timed(cls.draw)
 
+
+def timed(work: Callable) -> Callable:
     def draw(self: object, context: object) -> None:
         started = time.perf_counter()
         work(self, context)
-        spent.append(1e3 * (time.perf_counter() - started))
+        SPENT.append(1e3 * (time.perf_counter() - started))
 
     return draw
+
+
+def redraw() -> float:
+    """Have the sidebar drawn anew; milliseconds of the panels since this was last called."""
+    spent = sum(SPENT)
+    SPENT.clear()
+    region("UI").tag_redraw()
+    return spent
 
 
 main()

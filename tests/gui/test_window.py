@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from tests.benchmarks import window as benchmark
 from tests.gui.conftest import complaints
 from tests.gui.window import Window
 
-CONVERTED = "state()['converted']"
-RESTORED = f"not {CONVERTED}"
+CONVERTED, RESTORED = "is_converted()", "not is_converted()"
 
 
 @pytest.fixture
@@ -136,6 +138,19 @@ def test_a_world_without_a_map_is_refused_in_a_sentence(window: Window):
 def test_without_a_world_the_button_is_grey(window: Window):
     window.ask("[setattr(bpy.context.scene, 'world', None), remember_step('No world')]")
     before = window.ask("state()")
+    assert not window.ask("bpy.ops.sunsplit.convert.poll()")
     window.press("sunsplit.convert")
     window.settle()
     assert window.ask("state()") == before
+
+
+# What it costs
+
+
+def test_benchmark(window: Window, sunrise: Path, quiet: None):
+    """A small version of the benchmark: that it measures, not how fast it is."""
+    results = benchmark.measure(window, [sunrise], redraws=3, repeats=1)
+    assert all(min(one.times) > 0 for one in results)
+    assert len(results[0].times) == 3
+    lines = benchmark.table(results, "5.2").splitlines()
+    assert sum(line.startswith("| ") for line in lines) == 2 + len(results)

@@ -5,7 +5,7 @@
         window.ask("new_scene()")
         window.open_tab()
         window.press("sunsplit.convert")
-        window.wait_for("state()['converted']")
+        window.wait_for("is_converted()")
         window.key("ctrl+z")
 
 `ask` evaluates an expression inside (see inside.py); `press` finds a button by what it does,
@@ -23,6 +23,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,9 @@ INSIDE = Path(__file__).parent / "inside.py"
 STEP = 9
 """Pixels from one try to the next where a button is looked for: a button is 20 high."""
 
+
+DRAGS = 20
+"""Movements of a drag."""
 
 TABS, MARGIN = 22, 8
 """Pixels: width of the tabs at the sidebar's right side; what is left below the last panel."""
@@ -99,6 +103,12 @@ class Window:
         lines = (self.folder / "heartbeat").read_text(encoding="ascii").split("\n")
         return [float(line) for line in lines[:-1]]  # the last one may be half written
 
+    def longest_gap(self, start: float, end: float) -> float:
+        """Seconds, at most, between two heartbeats in a span of `time.monotonic`."""
+        beats = self.heartbeats()
+        pairs = [(a, b) for a, b in pairwise(beats) if b > start and a < end]
+        return max(b - a for a, b in pairs)
+
     def install(self, package: Path) -> list[str]:
         """Install a zip in the running Blender."""
         shutil.copy2(package, self.folder / package.name)
@@ -120,6 +130,20 @@ class Window:
         self.move(left + width // 2, top + height // 2)
         self.settle()
         self._do("key", name)
+
+    def drag(self, button: int, across: int, down: int) -> None:
+        """Drag with a button of the mouse held, from where it is; a little way at a time."""
+        self._do("mousedown", button)
+        for _ in range(DRAGS):
+            self._do("mousemove_relative", "--", across // DRAGS, down // DRAGS)
+            self.settle()
+        self._do("mouseup", button)
+
+    def quit(self) -> None:
+        """Close Blender as a user does; it must end well."""
+        self.key("ctrl+q")
+        if status := self.process.wait(60):
+            raise NotSeen(f"Blender ended with status {status}:\n{self.console()}")
 
     def settle(self) -> None:
         """Wait until Blender has handled what the mouse did, and drawn."""
