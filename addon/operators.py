@@ -7,21 +7,15 @@ from typing import TYPE_CHECKING
 import bpy
 from bpy.props import EnumProperty, FloatProperty
 
-from ..core.errors import SunsplitError
+from .modal import InSteps
 from .properties import CHOICES
+from .steps import Steps
 
 if TYPE_CHECKING:
-    from .jobs import Job
-
-NAVIGATION = {
-    *("MOUSEMOVE", "INBETWEEN_MOUSEMOVE", "MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE"),
-    *("TRACKPADPAN", "TRACKPADZOOM", "MOUSEROTATE", "WINDOW_DEACTIVATE", "NDOF_MOTION"),
-    *("TIMER_REPORT", "TIMER_REGION", "TIMER0", "TIMER1", "TIMER2", "TIMER_JOBS"),
-}
-"""What the window may do while a conversion is on its way: it must not change the scene."""
+    from .scene import SceneConversion
 
 
-class SUNSPLIT_OT_convert(bpy.types.Operator):
+class SUNSPLIT_OT_convert(InSteps, bpy.types.Operator):
     """Turn the brightest lights of the world's HDRI into sun lamps and keep the rest as world"""
 
     bl_idname = "sunsplit.convert"
@@ -29,6 +23,7 @@ class SUNSPLIT_OT_convert(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     __annotations__ = CHOICES
+    home = ".scene"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -37,83 +32,24 @@ class SUNSPLIT_OT_convert(bpy.types.Operator):
             return False
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """All at once, as scripts want it."""
-        from .scene import convert_scene, options_for, settings_for
-        from .words import progress
-
-        chosen = self._chosen(context.scene.sunsplit)
-        settings, options = settings_for(chosen), options_for(chosen)
-        try:
-            result = convert_scene(context.scene, settings, options, progress())
-        except SunsplitError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return self._done(context, result.headline)
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Beside the window, with progress, until it is done or Esc is pressed."""
-        if bpy.app.background:
-            return self.execute(context)
-        from .jobs import TICK, Job
+    def work(self, context: bpy.types.Context) -> Steps[SceneConversion]:
         from .scene import conversion_steps, options_for, settings_for
 
-        if Job.running:
-            self.report({"WARNING"}, "A conversion is on its way: Esc stops it.")
-            return {"CANCELLED"}
         chosen = self._chosen(context.scene.sunsplit)
-        try:
-            settings, options = settings_for(chosen), options_for(chosen)
-        except SunsplitError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self._job: Job = Job(conversion_steps(context.scene, settings, options))
-        self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
+        return conversion_steps(context.scene, settings_for(chosen), options_for(chosen))
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        from .words import show_progress
-
-        job = self._job
-        if event.type == "ESC" and event.value == "PRESS":
-            job.cancel()
-        elif event.type != "TIMER":
-            return {"PASS_THROUGH"} if event.type in NAVIGATION else {"RUNNING_MODAL"}
-        if not job.is_cancelled and not job.advance():
-            show_progress(context, job)
-            return {"RUNNING_MODAL"}
-        self.cancel(context)
-        if job.is_cancelled:
-            self.report({"INFO"}, "Conversion cancelled: the scene is as it was")
-            return {"CANCELLED"}
-        if job.error is not None:
-            if not isinstance(job.error, SunsplitError):
-                raise job.error
-            self.report({"ERROR"}, str(job.error))
-            return {"CANCELLED"}
-        return self._done(context, job.result.headline)
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        """Blender calls this, too, when the window goes away."""
-        from .words import show_progress
-
-        self._job.cancel()
-        context.window_manager.event_timer_remove(self._timer)
-        show_progress(context, None)
+    def done(self, context: bpy.types.Context, result: SceneConversion) -> set[str]:
+        for name, value in self._chosen(context.scene.sunsplit).items():
+            setattr(context.scene.sunsplit, name, value)
+            setattr(self, name, value)  # Adjust Last Operation shows what was used
+        self.report({"INFO"}, result.headline)
+        return {"FINISHED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         from .panel import draw_settings
 
         self.layout.use_property_split = True
         draw_settings(self.layout, self)
-
-    def _done(self, context: bpy.types.Context, headline: str) -> set[str]:
-        for name, value in self._chosen(context.scene.sunsplit).items():
-            setattr(context.scene.sunsplit, name, value)
-            setattr(self, name, value)  # Adjust Last Operation shows what was used
-        self.report({"INFO"}, headline)
-        return {"FINISHED"}
 
     def _chosen(self, scene_settings: bpy.types.PropertyGroup) -> dict[str, object]:
         """The scene's settings, and before them what was given as an argument."""

@@ -142,7 +142,7 @@ class SUNSPLIT_PT_world_advanced(_InWorld, _Advanced, bpy.types.Panel):
 
 def _draw_progress(layout: bpy.types.UILayout, job: Job) -> None:
     layout.progress(factor=job.fraction, text=job.stage.capitalize() or "Sunsplit")
-    layout.label(text="Esc: Cancel", icon="EVENT_ESC")
+    layout.label(text="Cancel", icon="EVENT_ESC")
 
 
 def _draw_report(layout: bpy.types.UILayout, report: str, characters: int) -> None:
