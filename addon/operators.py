@@ -30,7 +30,7 @@ class SUNSPLIT_OT_convert(InSteps, bpy.types.Operator):
         if context.scene.world is None:
             cls.poll_message_set("The scene has no world: add one with an HDRI first")
             return False
-        return True
+        return _is_editable(cls, context)
 
     def work(self, context: bpy.types.Context) -> Steps[SceneConversion]:
         from .scene import conversion_steps, options_for, settings_for
@@ -71,7 +71,7 @@ class SUNSPLIT_OT_restore(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _is_converted(cls, context)
+        return _is_converted(cls, context) and _is_editable(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from .scene import restore_scene
@@ -147,5 +147,14 @@ class SUNSPLIT_OT_select_suns(bpy.types.Operator):
 def _is_converted(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     if not context.scene.sunsplit.is_converted:
         operator.poll_message_set("This scene's world is not converted")
+        return False
+    return True
+
+
+def _is_editable(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    if context.scene.library is not None:
+        operator.poll_message_set(
+            "The scene is linked from another file: open that, or make the scene local"
+        )
         return False
     return True

@@ -79,6 +79,8 @@ def converted_world(
     Nothing is left behind when this fails.
     """
     new = world.copy()
+    if new.override_library:  # of which no new node would be saved
+        new = new.make_local(clear_liboverride=True)
     new[TAG] = True
     take_out_of_groups(new)
     try:
