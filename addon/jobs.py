@@ -52,6 +52,8 @@ class Job:
 
     def advance(self) -> bool:
         """Go on for a moment; whether that was the last one."""
+        if not self._is_at_work():
+            return True
         if Job._left_behind is not None and Job._left_behind.is_alive():
             return False
         until = time.perf_counter() + AT_A_TIME
