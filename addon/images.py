@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..core.environment import EnvironmentMap, environment_from_strips
 from ..core.errors import CannotWrite, UnusableInput
+from ..core.files import exr
 from ..core.files.maps import load
 from ..core.pixels import HeldPixels
 from ..core.progress import Progress
@@ -46,21 +47,27 @@ def read_image(image: bpy.types.Image) -> Steps[EnvironmentMap]:
         raise UnusableInput(f'"{image.name}" is a {image.source.lower()}: use a single image.')
     name, path = image.name, _file_of(image)
     if path is not None:
+        found = yield Apart(lambda listen, _: _of_file(path, name, listen), 0.0, READ)
+        if found is not None:
+            return found
+    pixels = _pixels_of(image)
+    shape = image.size[1], image.size[0], image.channels
+    return (
+        yield Apart(
+            lambda *_: known_map(pixels, name, lambda: _from_pixels(pixels, shape, name)), 0.0, READ
+        )
+    )
 
-        def known(progress: Progress, _: object) -> EnvironmentMap:
-            return known_file(path, name, lambda: _from_file(path, name, progress))
-    else:
-        pixels = _pixels_of(image)
-        shape = image.size[1], image.size[0], image.channels
 
-        def known(progress: Progress, _: object) -> EnvironmentMap:
-            return known_map(pixels, name, lambda: _from_pixels(pixels, shape, name))
+def _of_file(path: Path, name: str, progress: Progress) -> EnvironmentMap | None:
+    """The map of a file; None where Blender may read it in another way than the core does."""
+    if path.suffix.lower() == ".exr" and not exr.is_plain(path):
+        return None
 
-    return (yield Apart(known, 0.0, READ))
+    def read() -> EnvironmentMap:
+        return replace(load(path, progress=progress), name=Path(name).stem, file=name)
 
-
-def _from_file(path: Path, name: str, progress: Progress) -> EnvironmentMap:
-    return replace(load(path, progress=progress), name=Path(name).stem, file=name)
+    return known_file(path, name, read)
 
 
 def _from_pixels(
@@ -87,11 +94,11 @@ def _file_of(image: bpy.types.Image) -> Path | None:
 
 def _pixels_of(image: bpy.types.Image) -> NDArray[np.float32]:
     """All numbers of an image, in Blender's order."""
+    width, height = image.size  # which loads it, and only then is its type known
     if image.type == "MULTILAYER":
         raise UnusableInput(
             f'"{image.name}" is a multilayer EXR: save its combined pass as a plain EXR first.'
         )
-    width, height = image.size
     if not image.has_data and not width * height:
         raise UnusableInput(
             f'The image "{image.name}" cannot be loaded from {image.filepath or "anywhere"}: '
@@ -128,8 +135,6 @@ def write_map(folder: Path, kind: str, radiance: Radiance) -> Path:
 
     kind: what it is; the image's name in a conversion.
     """
-    from ..core.files import exr
-
     path = folder / f"{kind}.exr"
     try:
         if isinstance(radiance, LevelledPixels):
