@@ -46,10 +46,12 @@ class SUNSPLIT_OT_convert(InSteps, bpy.types.Operator):
         return {"FINISHED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        from .panel import draw_settings
+        from .panel import draw_advanced, draw_settings
 
         self.layout.use_property_split = True
         draw_settings(self.layout, self)
+        self.layout.separator()
+        draw_advanced(self.layout, self)
 
     def _chosen(self, scene_settings: bpy.types.PropertyGroup) -> dict[str, object]:
         """The scene's settings, and before them what was given as an argument."""
