@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import bpy
@@ -63,6 +64,8 @@ def _of_file(path: Path, name: str, progress: Progress) -> EnvironmentMap | None
     """The map of a file; None where Blender may read it in another way than the core does."""
     if path.suffix.lower() == ".exr" and not exr.is_plain(path):
         return None
+    if path.suffix.lower() == ".hdr" and find_spec("OpenImageIO") is None:
+        return None  # it is not to be had for all that Blender runs on
 
     def read() -> EnvironmentMap:
         return replace(load(path, progress=progress), name=Path(name).stem, file=name)
