@@ -46,6 +46,13 @@ def reset_factors(sky: bpy.types.Object) -> None:
     sky.update_tag()
 
 
+def keep_factors(old: bpy.types.Object | None, new: bpy.types.Object) -> None:
+    """Give a new rig the factors of the one that it replaces, if there is one."""
+    if old is not None:
+        for factor in FACTORS:
+            new[factor.name] = old.get(factor.name, factor.neutral)
+
+
 def changed_factors(sky: bpy.types.Object) -> list[str]:
     """The names of factors that make suns other than measured."""
     return [factor.name for factor in FACTORS if sky.get(factor.name) != factor.neutral]

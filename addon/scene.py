@@ -17,6 +17,7 @@ from ..core.sampling import needs_light_tree
 from ..core.settings import ConversionSettings
 from ..core.visible import VisiblePart, visible_part
 from . import passes
+from .controls import keep_factors
 from .driven import followed
 from .images import (
     READ,
@@ -168,6 +169,8 @@ def _what_is_visible(
     # EEVEE's world shines through everything: there, what is left in it would do harm.
     if not (needs.sight and settings.chooses_border and scene.render.engine == "CYCLES"):
         return None
+    if is_animated(light, ()):  # what is hidden now may come round
+        return None
     reach = yield from Reach.steps(needs.sight)
     to_map = light.map_from_world
     return (
@@ -211,6 +214,7 @@ def _replace(
         remove_images(images)
     light = find_light(new, scene.render.engine)  # the same, in the new world
     rig = make_rig(light.texture)
+    keep_factors(state.sky, rig.sky)
     lamps = make_lamps(conversion.suns, light, rig, new)
     sentences = [
         *made_sentences(conversion),

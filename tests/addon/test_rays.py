@@ -11,12 +11,14 @@ from sunsplit.addon.rays import Reach, camera_width
 from sunsplit.addon.scene_needs import needs_of
 from sunsplit.addon.steps import run_at_once
 from tests.blender import (
+    add_mapping,
     add_mesh,
     camera_towards,
     diffuse,
     fresh_scene,
     hdri_world,
     material,
+    node,
     plate_mesh,
     suns,
     to_light,
@@ -168,6 +170,15 @@ def test_through_a_window_only_what_is_in_front_of_it(two_suns):
     bpy.context.view_layer.update()
     bpy.ops.sunsplit.convert()
     assert heights(made) == pytest.approx([ABOVE[2]], abs=1e-3)
+
+
+def test_what_is_below_the_ground_may_come_round_in_an_animated_world(scene):
+    mapping = add_mapping(node(scene.world.node_tree, "TEX_ENVIRONMENT"))
+    for frame, angle in ((1, 0.0), (50, np.pi)):
+        mapping.inputs["Rotation"].default_value[0] = angle
+        mapping.inputs["Rotation"].keyframe_insert("default_value", frame=frame)
+    bpy.ops.sunsplit.convert()
+    assert len(suns(scene)) == 2
 
 
 def test_the_same_scene_is_seen_the_same_way_twice(scene):

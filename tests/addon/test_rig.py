@@ -238,6 +238,19 @@ def test_factors_of_all_suns(scene, two_suns):
         assert white == pytest.approx(1, abs=2e-3)
 
 
+def test_converting_again_keeps_the_factors_and_restore_forgets_them(scene, two_suns):
+    hdri_world(scene, two_suns)
+    bpy.ops.sunsplit.convert()
+    scene.sunsplit.sky["strength"] = 2.0
+    bpy.ops.sunsplit.convert(lights=1)
+    assert scene.sunsplit.sky["strength"] == 2
+    bpy.context.view_layer.update()
+    assert suns(scene)[0].data.exposure == pytest.approx(1)
+    bpy.ops.sunsplit.restore()
+    bpy.ops.sunsplit.convert()
+    assert scene.sunsplit.sky["strength"] == 1
+
+
 def test_drivers_need_no_python(scene, two_suns):
     hdri_world(scene, two_suns)
     bpy.ops.sunsplit.convert()
