@@ -5,7 +5,7 @@ import sys
 
 import bpy
 
-from . import command, operators, panel, properties
+from . import command, operators, overlay, panel, properties
 
 CLASSES = (
     properties.SunsplitLamp,
@@ -13,6 +13,7 @@ CLASSES = (
     properties.SunsplitSettings,
     operators.SUNSPLIT_OT_convert,
     operators.SUNSPLIT_OT_restore,
+    overlay.SUNSPLIT_OT_pick_sun,
     panel.SUNSPLIT_PT_main,
     panel.SUNSPLIT_PT_settings,
 )
@@ -23,6 +24,7 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.types.Scene.sunsplit = bpy.props.PointerProperty(type=properties.SunsplitSettings)
     command.register()
+    overlay.register()
     # Blender unregisters its add-ons when it ends. As a Python module it does not, and 4.5 then
     # hangs or crashes over any operator or panel that is left.
     if not bpy.app.binary_path:
@@ -33,6 +35,7 @@ def unregister() -> None:
     atexit.unregister(unregister)
     if not hasattr(bpy.types.Scene, "sunsplit"):
         return  # Blender disables an extension when it ends, after what `register` has asked for.
+    overlay.unregister()
     command.unregister()
     del bpy.types.Scene.sunsplit
     for cls in reversed(CLASSES):

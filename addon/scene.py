@@ -10,6 +10,7 @@ import bpy
 
 from ..core.conversion import Conversion
 from ..core.errors import UnusableInput
+from ..core.outlines import outlines_of
 from ..core.passes import parts_of, samples_of_passes
 from ..core.sampling import needs_light_tree
 from ..core.settings import ConversionSettings
@@ -229,6 +230,7 @@ def _install(
     for lamp in lamps:
         state.lamps.add().lamp = lamp
     state.collection = link_lamps(scene, lamps)
+    state.outlines = outlines_of(conversion).to_text()
     return SceneConversion(conversion, world, state.collection)
 
 
@@ -297,7 +299,7 @@ def restore_scene(scene: bpy.types.Scene) -> None:
     remove_groups(scene.view_layers)
     state.original_world = state.converted_world = state.collection = None
     state.lamps.clear()
-    state.report = ""
+    state.report = state.outlines = ""
     if state.light_tree_off and hasattr(scene, "cycles"):
         scene.cycles.use_light_tree = True
     state.light_tree_off = False

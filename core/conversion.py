@@ -31,9 +31,10 @@ class Conversion:
     (height, width, 3) of the width that was asked for, or None. levelled: the same with all pixels
     of a wide map, where these were asked for; then `residual` is as narrow as what was looked at.
     samples: what a Voronoi residual was made of, else None. predicted_error: what shadows of the
-    suns are wrong by, as a part of the mean irradiance; see `prediction.Prediction`. ground_error: what level ground in the open gets wrong
-    of the worst channel, as a part of its irradiance. visible: what suns were chosen from, where
-    that is not the whole map. notes: plain sentences for the user.
+    suns are wrong by, as a part of the mean irradiance; see `prediction.Prediction`. ground_error:
+    what level ground in the open gets wrong of the worst channel, as a part of its irradiance.
+    visible: what suns were chosen from, where that is not the whole map. notes: plain sentences
+    for the user.
     """
 
     environment: EnvironmentMap

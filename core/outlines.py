@@ -6,13 +6,16 @@ import base64
 import binascii
 import zlib
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
 from .cells import OUTSIDE
-from .conversion import Conversion
+
+if TYPE_CHECKING:  # what draws outlines does not convert
+    from .conversion import Conversion
 
 Floats = NDArray[np.float64]
 Runs = NDArray[np.uint16]

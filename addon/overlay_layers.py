@@ -1,0 +1,137 @@
+"""From marks on a screen to what is drawn: rims, colours, names."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .overlay_draw import Areas, Colour, Lines, Word, size_of
+from .overlay_geometry import Frame, Marks, arrow_head, place_labels
+from .overlay_suns import ShownSuns, label_of
+
+Floats = NDArray[np.float64]
+
+RIM: Colour = (0.0, 0.0, 0.0, 0.75)
+RING = 9.0
+"""Radius in pixels at scale 1 below which a disc becomes a ring with a dot in it."""
+
+DOT = 2.5
+WIDTH, RIM_WIDTH, HALO_WIDTH = 2.0, 4.5, 8.0
+FAINT = 0.45
+"""How strong what lies behind the globe is drawn."""
+
+NAMED = 4
+"""So many of the brightest have their names beside them, others only their rank."""
+
+LABELS = 64
+"""Of suns with a label at all: hundreds could not be read."""
+
+ARROWS = 3
+"""Of suns out of sight: the brightest ones, and those that are selected, have an arrow."""
+
+LETTERS = 12.0
+
+
+def sun_layers(suns: ShownSuns, marks: Marks, halo: Floats, scale: float) -> list[Lines | Areas]:
+    """Outlines in the suns' own colours with dark rims, dots in the middle, arrows at the frame.
+
+    halo: colours around those that are selected, (n, 4). scale: of the interface.
+    """
+    strength = np.where(marks.behind, FAINT, 1.0)
+    colour = np.column_stack([suns.colour, strength])
+    rim = np.column_stack([np.tile(RIM[:3], (len(suns), 1)), RIM[3] * strength])
+    lines, owner = marks.lines, marks.owner
+    chosen = suns.selected[owner]
+    layers: list[Lines | Areas] = [
+        Lines(lines[chosen], _both(halo[owner[chosen]]), HALO_WIDTH * scale),
+        Lines(lines, _both(rim[owner]), RIM_WIDTH * scale),
+        Lines(lines, _both(colour[owner]), WIDTH * scale),
+    ]
+    inside = np.flatnonzero(~marks.aside)
+    for radius, of_suns in ((DOT + 1.25, rim), (DOT, colour)):
+        dots = marks.place[inside, None, None] + radius * scale * _DISC
+        layers.append(Areas(dots.reshape(-1, 3, 2), of_suns[inside].repeat(len(_DISC), axis=0)))
+    return layers
+
+
+def arrow_layers(
+    suns: ShownSuns, marks: Marks, frame: Frame, halo: Floats, scale: float
+) -> list[Lines | Areas]:
+    """At the frame, the way to suns that are out of sight."""
+    layers: list[Lines | Areas] = []
+    for number in arrows(suns, marks):
+        place = marks.place[number]
+        way = place - frame.middle
+        unit = way / max(float(np.linalg.norm(way)), 1e-9)
+        sizes = [(1.55, RIM), (1.0, (*suns.colour[number], 1.0))]
+        if suns.selected[number]:
+            sizes.insert(0, (2.1, tuple(halo[number])))
+        for size, colour in sizes:
+            tip = place + unit * (4 + 5 * size) * scale
+            layers.append(Areas(arrow_head(tip, way, 16 * size * scale)[None], np.array([colour])))
+    return layers
+
+
+def arrows(suns: ShownSuns, marks: Marks) -> list[int]:
+    """Which suns have an arrow."""
+    wanted = suns.selected | (np.arange(len(suns)) < ARROWS)
+    return np.flatnonzero(marks.aside & wanted).tolist()
+
+
+def ray_layers(
+    rays: list[tuple[int, Floats]], suns: ShownSuns, scale: float
+) -> list[Lines | Areas]:
+    """From what is lit towards suns, with a head that points the way of the light."""
+    layers: list[Lines | Areas] = []
+    for number, ray in rays:
+        near, far = (*suns.colour[number], 0.95), (*suns.colour[number], 0.35)
+        head = arrow_head(ray[0], ray[0] - ray[1], 14 * scale)
+        layers += [
+            Lines(ray[None], (0, 0, 0, 0.35), 3.5 * scale),
+            Lines(ray[None], np.array([[near, far]]), 1.5 * scale),
+            Areas(head[None], np.array([near])),
+        ]
+    return layers
+
+
+def words(
+    suns: ShownSuns, marks: Marks, halo: Floats, frame: Frame, scale: float, ranks_only: bool
+) -> list[Word]:
+    """Names beside suns, so far as they can be read."""
+    pointed = set(arrows(suns, marks))
+    candidates = [n for n in range(len(suns)) if n in pointed or _near(marks, frame, n)]
+    # Those that are selected come first, then the brightest.
+    candidates.sort(key=lambda n: (not suns.selected[n], n))
+    candidates = candidates[:LABELS]
+    texts, colours, sizes, away = [], [], [], []
+    for number in candidates:
+        chosen = bool(suns.selected[number])
+        full = not ranks_only and (number < NAMED or chosen)
+        texts.append(label_of(suns.lamps[number], suns.rank[number], full))
+        colour = halo[number] if chosen else np.append(suns.colour[number], 1)
+        colours.append(tuple(colour.tolist()))
+        sizes.append(size_of(texts[-1], LETTERS * scale))
+        away.append((2.2 if number in pointed else 1.2) * RING * scale)
+    corners = place_labels(
+        marks.place[candidates], np.array(sizes).reshape(-1, 2), np.array(away), frame
+    )
+    return [
+        Word(text, *corner, *size, colour)
+        for text, corner, size, colour in zip(texts, corners, sizes, colours, strict=True)
+        if corner
+    ]
+
+
+def _near(marks: Marks, frame: Frame, number: int) -> bool:
+    return bool(not marks.aside[number] and frame.holds(marks.place[number][None])[0])
+
+
+def _both(colour: Floats) -> Floats:
+    """The same colour for both ends of each piece, (m, 2, 4)."""
+    return colour[:, None].repeat(2, axis=1)
+
+
+_TURN = np.linspace(0, 2 * np.pi, 13)
+_RIM = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=-1)
+_DISC = np.stack([np.zeros_like(_RIM[1:]), _RIM[:-1], _RIM[1:]], axis=1)
+"""A disc of radius 1 as triangles, (12, 3, 2)."""
