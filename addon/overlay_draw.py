@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import blf
 import gpu
@@ -52,13 +53,18 @@ class Word:
 
 
 class Drawing:
-    """What is drawn one over the other; made once, drawn as often as it stays the same."""
+    """What is drawn one over the other, lines below areas below words; made once, drawn as often
+    as it stays the same."""
 
     def __init__(
         self, layers: Sequence[Lines | Areas], words: Sequence[Word] = (), size: float = 12
     ) -> None:
-        layers = [*layers, _plates(words, EDGE * size)]
-        self._parts = [_part(layer) for layer in layers if len(_points(layer))]
+        lines = [layer for layer in layers if isinstance(layer, Lines) and len(layer.pieces)]
+        areas = [layer for layer in layers if isinstance(layer, Areas)]
+        areas = _together([*areas, _plates(words, EDGE * size)])
+        self._parts = [_lines(layer) for layer in lines]
+        if len(areas.triangles):
+            self._parts.append(_areas(areas))
         self._words, self._size = words, size
 
     def draw(self) -> None:
@@ -85,8 +91,34 @@ class Drawing:
             blf.draw(0, word.text)
 
 
-def size_of(text: str, size: float) -> tuple[float, float]:
-    """Width and height of a text in pixels."""
+class Kept:
+    """What was drawn last in each region, so that nothing is made again that stays the same."""
+
+    MOST = 16
+
+    def __init__(self) -> None:
+        self._drawings: dict[int, tuple[object, Drawing]] = {}
+
+    def draw(self, region: int, key: object, make: Callable[[], Drawing]) -> None:
+        """Draw what `make` gives; it is called where the region's key differs from the last."""
+        if self._drawings.get(region, (None,))[0] != key:
+            self._drawings.pop(region, None)
+            while len(self._drawings) >= self.MOST:  # regions that are no more
+                del self._drawings[next(iter(self._drawings))]
+            self._drawings[region] = key, make()
+        self._drawings[region][1].draw()
+
+    def forget(self) -> None:
+        self._drawings.clear()
+
+
+def sizes_of(texts: Sequence[str], size: float) -> Floats:
+    """Width and height of texts in pixels, (n, 2)."""
+    return np.array([_size_of(text, size) for text in texts]).reshape(-1, 2)
+
+
+@lru_cache(1024)
+def _size_of(text: str, size: float) -> tuple[float, float]:
     blf.size(0, size)
     return blf.dimensions(0, text)
 
@@ -100,25 +132,37 @@ def _plates(words: Sequence[Word], edge: float) -> Areas:
     return Areas(box.reshape(-1, 3, 2), np.tile(PLATE, (len(box) * 2, 1)))
 
 
-def _points(layer: Lines | Areas) -> Floats:
-    return layer.pieces if isinstance(layer, Lines) else layer.triangles
+def _together(areas: Sequence[Areas]) -> Areas:
+    triangles = np.concatenate([layer.triangles for layer in areas])
+    return Areas(triangles, np.concatenate([layer.colour for layer in areas]))
 
 
-def _part(
-    layer: Lines | Areas,
-) -> tuple[gpu.types.GPUShader, gpu.types.GPUBatch, Colour | None, float | None]:
-    points = _points(layer).reshape(-1, 2)
-    attributes = {"pos": np.pad(points, ((0, 0), (0, 1))).astype(np.float32)}
-    if isinstance(layer, Areas):
-        shader = gpu.shader.from_builtin("SMOOTH_COLOR")
-        attributes["color"] = layer.colour.repeat(3, axis=0).astype(np.float32)
-        return shader, batch_for_shader(shader, "TRIS", attributes), None, None
-    if isinstance(layer.colour, tuple):
+_Part = tuple[gpu.types.GPUShader, gpu.types.GPUBatch, Colour | None, float | None]
+
+
+def _areas(areas: Areas) -> _Part:
+    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    colour = areas.colour.repeat(3, axis=0).astype(np.float32)
+    attributes = {"pos": _positions(areas.triangles), "color": colour}
+    return shader, batch_for_shader(shader, "TRIS", attributes), None, None
+
+
+def _lines(lines: Lines) -> _Part:
+    attributes = {"pos": _positions(lines.pieces)}
+    if isinstance(lines.colour, tuple):
         shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
-        return shader, batch_for_shader(shader, "LINES", attributes), layer.colour, layer.width
+        return shader, batch_for_shader(shader, "LINES", attributes), lines.colour, lines.width
     shader = gpu.shader.from_builtin("POLYLINE_SMOOTH_COLOR")
-    attributes["color"] = layer.colour.reshape(-1, 4).astype(np.float32)
-    return shader, batch_for_shader(shader, "LINES", attributes), None, layer.width
+    attributes["color"] = lines.colour.reshape(-1, 4).astype(np.float32)
+    return shader, batch_for_shader(shader, "LINES", attributes), None, lines.width
+
+
+def _positions(points: Floats) -> NDArray[np.float32]:
+    """These shaders want a third coordinate."""
+    flat = points.reshape(-1, 2)
+    positions = np.zeros((len(flat), 3), np.float32)
+    positions[:, :2] = flat
+    return positions
 
 
 _UNIT = np.array([(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)], np.float64)

@@ -87,6 +87,11 @@ class Marks:
     aside: NDArray[np.bool_]
     behind: NDArray[np.bool_]
 
+    @property
+    def key(self) -> tuple[bytes, ...]:
+        """Tells apart what would be drawn differently."""
+        return self.place.tobytes(), self.lines.tobytes()
+
     def hit(self, x: float, y: float, reach: float) -> int | None:
         """The sun whose centre or outline is nearest, at most `reach` pixels away."""
         at = np.array([x, y])
@@ -218,20 +223,22 @@ def place_labels(
 
     places: (n, 2). sizes: width and height of each, (n, 2). aways: how far from its place, (n,).
     """
-    taken = np.empty((0, 2, 2))
-    corners: list[tuple[float, float] | None] = []
-    for place, size, away in zip(places, sizes, aways, strict=True):
-        corner = None
-        for side in _SIDES:
-            low = place + side * away - (side < 0) * size
-            box = np.array([low - SPACE, low + size + SPACE])
-            clash = ((taken[:, 0] < box[1]) & (box[0] < taken[:, 1])).all(axis=1).any()
-            if not clash and frame.holds(box).all():
-                corner = float(low[0]), float(low[1])
-                taken = np.concatenate([taken, box[None]])
-                break
-        corners.append(corner)
-    return corners
+    low = places[:, None] + _SIDES * aways[:, None, None] - (_SIDES < 0) * sizes[:, None]
+    corners = low.reshape(-1, 2)
+    begin = corners - SPACE
+    end = corners + sizes.repeat(len(_SIDES), axis=0) + SPACE
+    free = frame.holds(begin) & frame.holds(end)
+    (left, bottom), (right, top) = begin.T, end.T
+    clash = (left[:, None] < right) & (left < right[:, None])
+    clash &= (bottom[:, None] < top) & (bottom < top[:, None])
+    chosen: list[tuple[float, float] | None] = []
+    for number in range(len(places)):
+        first = len(_SIDES) * number
+        side = int(free[first : first + len(_SIDES)].argmax()) + first
+        chosen.append((float(corners[side, 0]), float(corners[side, 1])) if free[side] else None)
+        if free[side]:
+            free &= ~clash[side]
+    return chosen
 
 
 def globe(view: View) -> tuple[Floats, float]:
@@ -280,7 +287,7 @@ def _rings(
 
 def _at_frame(clip: Floats, view: View, margin: float) -> Floats:
     """Where the way from the frame's middle to directions that are out of sight leaves it."""
-    frame = view.frame.shrunk(3 * margin)
+    frame = view.frame.shrunk(6 * margin)  # the navigation buttons stay free
     middle = frame.middle
     front = clip[:, 3] > 1e-6
     way = clip[:, :2] * (view.width, view.height)

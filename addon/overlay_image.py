@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..core.errors import UnusableInput
 from ..core.outlines import Outlines
-from .overlay_draw import Colour, Drawing, Lines
+from .overlay_draw import Colour, Drawing, Kept, Lines
 from .overlay_geometry import Marks, marks_in_map
 from .overlay_layers import LETTERS, RING, sun_layers, words
 from .overlay_suns import ShownSuns, shown_suns
@@ -24,10 +24,7 @@ REGION: Colour = (1.0, 0.25, 0.78, 1.0)
 CELLS: Colour = (0.35, 0.9, 1.0, 0.9)
 UNDER: Colour = (0.0, 0.0, 0.0, 0.45)
 
-MOST_REGIONS = 16
-
-_borders: list[tuple[str, Drawing]] = []
-_drawn: dict[int, tuple[object, Drawing]] = {}
+_borders, _kept = Kept(), Kept()
 
 
 def draw_image() -> None:
@@ -37,22 +34,19 @@ def draw_image() -> None:
     if found is None:
         return
     suns, marks, (origin, size) = found
+    region, scale = context.region.as_pointer(), context.preferences.system.ui_scale
+    text = context.scene.sunsplit.outlines
     with gpu.matrix.push_pop():
         gpu.matrix.translate((origin[0], origin[1] + size[1]))
         gpu.matrix.scale((size[0], -size[1]))
-        _border_drawing(context).draw()
-    halo, scale = halo_of(context, suns), context.preferences.system.ui_scale
-    frame = free_frame(context)
-    key = (suns.key, marks.place.tobytes(), frame, halo.tobytes(), scale)
-    region = context.region.as_pointer()
-    if _drawn.get(region, (None,))[0] != key:
-        _drawn.pop(region, None)
-        while len(_drawn) >= MOST_REGIONS:
-            del _drawn[next(iter(_drawn))]
-        layers = sun_layers(suns, marks, halo, scale)
-        labels = words(suns, marks, halo, frame, scale, True)
-        _drawn[region] = key, Drawing(layers, labels, LETTERS * scale)
-    _drawn[region][1].draw()
+        _borders.draw(0, (text, scale), lambda: Drawing(border_layers(text, scale)))
+    halo, frame = halo_of(context, suns), free_frame(context)
+
+    def drawing() -> Drawing:
+        labels = words(suns, marks, halo, frame, scale, ranks_only=True)
+        return Drawing(sun_layers(suns, marks, halo, scale), labels, LETTERS * scale)
+
+    _kept.draw(region, (suns.key, marks.key, frame, halo.tobytes(), scale), drawing)
 
 
 def seen_map(
@@ -60,8 +54,9 @@ def seen_map(
 ) -> tuple[ShownSuns, Marks, tuple[Floats, Floats]] | None:
     """Suns, where they are in the Image editor of a context, and the rectangle that the map fills:
     lower left corner and size in pixels. None where it shows something else."""
-    image = context.space_data.image
-    if image is None or not is_shown(context):
+    space = context.space_data
+    image = space.image
+    if image is None or space.mode == "UV" or not is_shown(context):
         return None
     light = light_shown(context.scene, image)
     if light is None:
@@ -98,17 +93,8 @@ def map_on_screen(region: bpy.types.Region) -> tuple[Floats, Floats]:
 
 def forget() -> None:
     """Free what the graphics card holds."""
-    _borders.clear()
-    _drawn.clear()
-
-
-def _border_drawing(context: bpy.types.Context) -> Drawing:
-    """Region A and cells in u, v; made again only after another conversion."""
-    text = context.scene.sunsplit.outlines
-    if not _borders or _borders[0][0] != text:
-        scale = context.preferences.system.ui_scale
-        _borders[:] = [(text, Drawing(border_layers(text, scale)))]
-    return _borders[0][1]
+    _borders.forget()
+    _kept.forget()
 
 
 def border_layers(text: str, scale: float) -> list[Lines]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .overlay_draw import Areas, Colour, Lines, Word, size_of
+from .overlay_draw import Areas, Colour, Lines, Word, sizes_of
 from .overlay_geometry import Frame, Marks, arrow_head, place_labels
 from .overlay_suns import ShownSuns, label_of
 
@@ -16,7 +16,7 @@ RING = 9.0
 """Radius in pixels at scale 1 below which a disc becomes a ring with a dot in it."""
 
 DOT = 2.5
-WIDTH, RIM_WIDTH, HALO_WIDTH = 2.0, 4.5, 8.0
+WIDTH, RIM_WIDTH, HALO_WIDTH = 2.0, 4.5, 7.0
 FAINT = 0.45
 """How strong what lies behind the globe is drawn."""
 
@@ -63,12 +63,15 @@ def arrow_layers(
         place = marks.place[number]
         way = place - frame.middle
         unit = way / max(float(np.linalg.norm(way)), 1e-9)
-        sizes = [(1.55, RIM), (1.0, (*suns.colour[number], 1.0))]
+        shells = [(2.0, RIM), (0.0, (*suns.colour[number], 1.0))]
         if suns.selected[number]:
-            sizes.insert(0, (2.1, tuple(halo[number])))
-        for size, colour in sizes:
-            tip = place + unit * (4 + 5 * size) * scale
-            layers.append(Areas(arrow_head(tip, way, 16 * size * scale)[None], np.array([colour])))
+            shells.insert(0, (5.0, tuple(halo[number])))
+        for wider, colour in shells:
+            # By so much the tip goes ahead, and the base back, of a triangle that is wider all
+            # around.
+            tip = place + unit * (9 + 2.44 * wider) * scale
+            head = arrow_head(tip, way, (16 + 3.44 * wider) * scale)
+            layers.append(Areas(head[None], np.array([colour])))
     return layers
 
 
@@ -82,48 +85,45 @@ def ray_layers(
     rays: list[tuple[int, Floats]], suns: ShownSuns, scale: float
 ) -> list[Lines | Areas]:
     """From what is lit towards suns, with a head that points the way of the light."""
-    layers: list[Lines | Areas] = []
-    for number, ray in rays:
-        near, far = (*suns.colour[number], 0.95), (*suns.colour[number], 0.35)
-        head = arrow_head(ray[0], ray[0] - ray[1], 14 * scale)
-        layers += [
-            Lines(ray[None], (0, 0, 0, 0.35), 3.5 * scale),
-            Lines(ray[None], np.array([[near, far]]), 1.5 * scale),
-            Areas(head[None], np.array([near])),
-        ]
-    return layers
+    if not rays:
+        return []
+    number = [sun for sun, _ in rays]
+    pieces = np.array([ray for _, ray in rays])
+    colour = np.ones((len(rays), 2, 4))
+    colour[..., :3] = suns.colour[number][:, None]
+    colour[..., 3] = 0.95, 0.35
+    heads = np.array([arrow_head(ray[0], ray[0] - ray[1], 14 * scale) for ray in pieces])
+    return [
+        Lines(pieces, (0, 0, 0, 0.35), 3.5 * scale),
+        Lines(pieces, colour, 1.5 * scale),
+        Areas(heads, colour[:, 0]),
+    ]
 
 
 def words(
     suns: ShownSuns, marks: Marks, halo: Floats, frame: Frame, scale: float, ranks_only: bool
 ) -> list[Word]:
     """Names beside suns, so far as they can be read."""
-    pointed = set(arrows(suns, marks))
-    candidates = [n for n in range(len(suns)) if n in pointed or _near(marks, frame, n)]
+    shown = ~marks.aside & frame.holds(marks.place)
+    shown[arrows(suns, marks)] = True
     # Those that are selected come first, then the brightest.
-    candidates.sort(key=lambda n: (not suns.selected[n], n))
-    candidates = candidates[:LABELS]
-    texts, colours, sizes, away = [], [], [], []
-    for number in candidates:
-        chosen = bool(suns.selected[number])
-        full = not ranks_only and (number < NAMED or chosen)
-        texts.append(label_of(suns.lamps[number], suns.rank[number], full))
-        colour = halo[number] if chosen else np.append(suns.colour[number], 1)
-        colours.append(tuple(colour.tolist()))
-        sizes.append(size_of(texts[-1], LETTERS * scale))
-        away.append((2.2 if number in pointed else 1.2) * RING * scale)
-    corners = place_labels(
-        marks.place[candidates], np.array(sizes).reshape(-1, 2), np.array(away), frame
-    )
+    found = np.flatnonzero(shown)
+    found = found[np.argsort(~suns.selected[found], kind="stable")][:LABELS]
+    full = suns.selected | (np.arange(len(suns)) < NAMED)
+    full &= not ranks_only
+    texts = [label_of(suns.lamps[n], suns.rank[n], bool(full[n])) for n in found]
+    colours = np.column_stack([suns.colour, np.ones(len(suns))])
+    colours[suns.selected] = halo[suns.selected]
+    away = np.where(marks.aside, 2.2, 1.2) * RING * scale
+    sizes = sizes_of(texts, LETTERS * scale)
+    corners = place_labels(marks.place[found], sizes, away[found], frame)
     return [
-        Word(text, *corner, *size, colour)
-        for text, corner, size, colour in zip(texts, corners, sizes, colours, strict=True)
+        Word(text, *corner, *size, tuple(colour))
+        for text, corner, size, colour in zip(
+            texts, corners, sizes.tolist(), colours[found].tolist(), strict=True
+        )
         if corner
     ]
-
-
-def _near(marks: Marks, frame: Frame, number: int) -> bool:
-    return bool(not marks.aside[number] and frame.holds(marks.place[number][None])[0])
 
 
 def _both(colour: Floats) -> Floats:

@@ -50,12 +50,15 @@ class ShownSuns:
 
 def shown_suns(context: bpy.types.Context) -> ShownSuns:
     """The lamps of the scene's conversion that can be seen; none without a conversion."""
-    layer = context.view_layer
+    layer, space = context.view_layer, context.space_data
+    # In a local view only what belongs to it is there.
+    view = space if space is not None and space.type == "VIEW_3D" else None
     lamps, rank, values, selected = [], [], [], []
     for number, entry in enumerate(context.scene.sunsplit.lamps, start=1):
         lamp = entry.lamp
-        # Without a layer, Blender asks for that of the window: the same, but not in a test.
-        if lamp is None or lamp.type != "LIGHT" or not lamp.visible_get(view_layer=layer):
+        if lamp is None or lamp.type != "LIGHT":  # the user has removed it, or changed it
+            continue
+        if not lamp.visible_get(view_layer=layer, viewport=view):
             continue
         data = lamp.data
         lamps.append(lamp)

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .overlay_draw import Drawing, Lines
+from .overlay_draw import Drawing, Kept, Lines
 from .overlay_geometry import (
     Frame,
     Marks,
@@ -21,10 +21,7 @@ from .overlay_suns import ShownSuns, lit_place, shown_suns
 
 Floats = NDArray[np.float64]
 
-MOST_REGIONS = 16
-"""So many regions' drawings are kept."""
-
-_drawn: dict[int, tuple[object, Drawing]] = {}
+_kept = Kept()
 _rims: list[tuple[object, Floats]] = []
 
 
@@ -40,12 +37,7 @@ def draw_view() -> None:
     halo, scale = halo_of(context, suns), context.preferences.system.ui_scale
     key = (suns.key, view.matrix.tobytes(), view.frame, pivot.tobytes(), halo.tobytes(), scale)
     region = context.region.as_pointer()
-    if _drawn.get(region, (None,))[0] != key:
-        _drawn.pop(region, None)
-        while len(_drawn) >= MOST_REGIONS:
-            del _drawn[next(iter(_drawn))]
-        _drawn[region] = key, _drawing(suns, view, pivot, halo, scale)
-    _drawn[region][1].draw()
+    _kept.draw(region, key, lambda: _drawing(suns, view, pivot, halo, scale))
 
 
 def is_shown(context: bpy.types.Context) -> bool:
@@ -103,7 +95,7 @@ def halo_of(context: bpy.types.Context, suns: ShownSuns) -> Floats:
 
 def forget() -> None:
     """Free what the graphics card holds."""
-    _drawn.clear()
+    _kept.forget()
     _rims.clear()
 
 
