@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import binascii
 import zlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -58,13 +57,11 @@ class Outlines:
         """What `to_text` has written. Raises ValueError for anything else."""
         try:
             packed = base64.b64decode(text, validate=True)
-            if packed[:1] != VERSION:
-                raise ValueError("outlines of another version")
             data = zlib.decompress(packed[1:])
-        except (binascii.Error, zlib.error) as error:
+        except (ValueError, zlib.error) as error:
             raise ValueError("no outlines") from error
-        if len(data) < 20 or len(data) % 8 != 4:
-            raise ValueError("outlines that end too early")
+        if packed[:1] != VERSION or len(data) < 20 or len(data) % 8 != 4:
+            raise ValueError("outlines of another version, or that end too early")
         *sizes, count = (int(number) for number in np.frombuffer(data[:20], "<u4"))
         runs = np.frombuffer(data[20:], "<u2").astype(np.uint16).reshape(-1, 4)
         return cls(runs[:count], runs[count:], (sizes[0], sizes[1]), (sizes[2], sizes[3]))
