@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ..core.errors import UnusableInput
 from ..core.outlines import Outlines
 from .overlay_draw import Colour, Drawing, Kept, Lines
-from .overlay_geometry import Marks, marks_in_map
 from .overlay_layers import LETTERS, RING, sun_layers, words
+from .overlay_marks import MapDiscs, Marks, discs_in_map, marks_in_map
 from .overlay_suns import ShownSuns, shown_suns
 from .overlay_view import free_frame, halo_of, is_shown
 from .world import WorldLight, find_light
@@ -25,6 +25,7 @@ CELLS: Colour = (0.35, 0.9, 1.0, 0.9)
 UNDER: Colour = (0.0, 0.0, 0.0, 0.45)
 
 _borders, _kept = Kept(), Kept()
+_discs: list[tuple[object, MapDiscs]] = []
 
 
 def draw_image() -> None:
@@ -63,9 +64,9 @@ def seen_map(
         return None
     suns = shown_suns(context)
     origin, size = map_on_screen(context.region)
-    to_light = suns.to_light @ light.map_from_world.T
+    discs = _discs_of(suns.to_light @ light.map_from_world.T, suns.half_angle)
     least = RING * context.preferences.system.ui_scale
-    return suns, marks_in_map(to_light, suns.half_angle, origin, size, least), (origin, size)
+    return suns, marks_in_map(discs, origin, size, least), (origin, size)
 
 
 def light_shown(scene: bpy.types.Scene, image: bpy.types.Image) -> WorldLight | None:
@@ -94,7 +95,16 @@ def map_on_screen(region: bpy.types.Region) -> tuple[Floats, Floats]:
 def forget() -> None:
     """Free what the graphics card holds."""
     _borders.forget()
+    _discs.clear()
     _kept.forget()
+
+
+def _discs_of(to_light: Floats, half_angle: Floats) -> MapDiscs:
+    """They stay the same while the map is moved and zoomed."""
+    key = to_light.tobytes(), half_angle.tobytes()
+    if not _discs or _discs[0][0] != key:
+        _discs[:] = [(key, discs_in_map(to_light, half_angle))]
+    return _discs[0][1]
 
 
 def border_layers(text: str, scale: float) -> list[Lines]:

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .overlay_draw import Areas, Colour, Lines, Word, sizes_of
-from .overlay_geometry import Frame, Marks, arrow_head, place_labels
+from .overlay_marks import Marks
+from .overlay_screen import Frame, arrow_head, place_labels
 from .overlay_suns import ShownSuns, label_of
 
 Floats = NDArray[np.float64]

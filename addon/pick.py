@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .overlay_geometry import Marks
+from .overlay_marks import Marks
 from .overlay_suns import ShownSuns
 from .overlay_view import is_shown
 

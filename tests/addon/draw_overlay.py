@@ -11,8 +11,9 @@ import numpy as np
 from mathutils import Matrix
 
 from sunsplit.addon.overlay_draw import Drawing
-from sunsplit.addon.overlay_geometry import Frame, marks_in_map
 from sunsplit.addon.overlay_layers import sun_layers, words
+from sunsplit.addon.overlay_marks import discs_in_map, marks_in_map
+from sunsplit.addon.overlay_screen import Frame
 from sunsplit.addon.overlay_suns import ShownSuns
 
 WIDTH, HEIGHT = 400, 300
@@ -32,7 +33,7 @@ def main(path: str) -> None:
     # On a map 960 x 480 with its middle in the picture's, a pixel is 3 / 8 of a degree.
     size = np.array([960.0, 480.0])
     origin = np.array([WIDTH, HEIGHT]) / 2 - size / 2
-    marks = marks_in_map(suns.to_light, suns.half_angle, origin, size, 9.0)
+    marks = marks_in_map(discs_in_map(suns.to_light, suns.half_angle), origin, size, 9.0)
     halo, frame = np.ones((1, 4)), Frame(0, 0, WIDTH, HEIGHT)
     gpu.init()
     canvas = gpu.types.GPUOffScreen(WIDTH, HEIGHT)
