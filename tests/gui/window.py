@@ -39,10 +39,13 @@ STEP = 9
 """Pixels from one try to the next where a button is looked for: a button is 20 high."""
 
 
-DRAGS = 20
+DRAGS = 10
 """Movements of a drag."""
 
-TABS, MARGIN = 22, 8
+FOLDING = 0.3
+"""Seconds that a panel takes to fold."""
+
+TABS, MARGIN = 28, 8
 """Pixels: width of the tabs at the sidebar's right side; what is left below the last panel."""
 
 
@@ -174,15 +177,49 @@ class Window:
             self.settle()
 
     def find(self, name: str) -> tuple[int, int]:
-        """Where in the sidebar the button of an operator or property is: `sunsplit.convert`."""
-        left, top, width, height = self.ask("place('UI')")
-        x = left + (width - TABS) // 2
-        for y in range(top + STEP, top + height, STEP):
+        """Where the sidebar has the button of an operator or property, as `sunsplit.convert`."""
+        for x, y in self._rows():
             self.move(x, y)
             self.settle()
             if self.ask("hovered()") == name:
-                return x, y
+                self.settle()  # the mouse may have been seen at the row before
+                if self.ask("hovered()") == name:
+                    return x, y
         raise NotSeen(f"No button {name} in the sidebar.")
+
+    def unfold(self, panel: str) -> None:
+        """Click on the header of a folded panel, as `SUNSPLIT_PT_settings`, where it is in sight.
+
+        A header is found by what a click does; a click on another one is taken back.
+        """
+        before = self._drawn()
+        if panel in before:
+            return
+        for x, y in self._rows():
+            self.move(x, y)
+            self.settle()
+            if self.ask("hovered()"):
+                continue
+            self._do("click", 1)
+            after = self._drawn()
+            if panel in after:
+                return
+            if after != before:
+                self._do("click", 1)
+                before = self._drawn()
+        raise NotSeen(f"No header of {panel} in the sidebar.")
+
+    def _rows(self) -> list[tuple[int, int]]:
+        """Points down the sidebar, where buttons are that are half as wide as it or wider."""
+        left, top, width, height = self.ask("place('UI')")
+        x = left + round(0.6 * (width - TABS))
+        return [(x, y) for y in range(top + STEP, top + height, STEP)]
+
+    def _drawn(self) -> set[str]:
+        """The panels that are not folded."""
+        time.sleep(FOLDING)
+        self.ask("redraw()")
+        return set(self.ask("redraw()"))  # between two ticks, Blender draws what it has to
 
     def press(self, name: str) -> None:
         """Click the button of an operator."""
