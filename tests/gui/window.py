@@ -18,7 +18,6 @@ import json
 import os
 import shutil
 import subprocess
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -41,6 +40,9 @@ STEP = 9
 
 DRAGS = 10
 """Movements of a drag."""
+
+WITH_US = ("setpriv", "--pdeathsig", "KILL")
+"""A program behind these words ends when the tests end, even when they are killed."""
 
 FOLDING = 0.3
 """Seconds that a panel takes to fold."""
@@ -250,18 +252,19 @@ class Window:
 def open_window(debian: Debian, sky: Path) -> Iterator[Window]:
     """A Blender in a display of its own, with a map at hand; it ends with the block."""
     with ExitStack() as stack:
-        folder = Path(tempfile.mkdtemp(prefix="sunsplit-", dir=debian.root / "tmp"))
-        stack.callback(shutil.rmtree, folder)
+        folder = stack.enter_context(debian.shared_folder())
         shutil.copy2(sky, folder / "sky.hdr")
         shutil.copy2(INSIDE, folder / INSIDE.name)
         display = stack.enter_context(_display())
         here = debian.inside(folder)
-        environment = debian.environment(here) | {"DISPLAY": display}
         command = ["blender", "--window-geometry", "0", "0", str(WIDTH), str(HEIGHT)]
         command += ["--python-exit-code", "1", "--python", f"{here}/{INSIDE.name}", "--", here]
         with (folder / "console").open("w") as console:
             process = subprocess.Popen(
-                debian.command(*command), env=environment, stdout=console, stderr=console
+                [*WITH_US, *debian.command(*command)],
+                env=debian.environment(here) | {"DISPLAY": display},
+                stdout=console,
+                stderr=console,
             )
         stack.callback(_end, process)
         window = Window(debian, folder, display, process)
@@ -275,7 +278,7 @@ def _display() -> Iterator[str]:
     read, write = os.pipe()
     screen = ["-screen", "0", f"{WIDTH}x{HEIGHT}x24"]
     process = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), *screen, "-nolisten", "tcp"],
+        [*WITH_US, "Xvfb", "-displayfd", str(write), *screen, "-nolisten", "tcp"],
         pass_fds=[write],
         stderr=subprocess.DEVNULL,
     )
