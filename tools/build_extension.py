@@ -1,6 +1,7 @@
 """Builds the extension: one zip for each Blender and platform, with all the wheels it needs.
 
-    python tools/build_extension.py [--blender 4.5|5.2] [--platform NAME|host] [-o DIR]
+    python tools/build_extension.py [--blender 4.5|5.2] [--platform NAME|host] [--python 3.N]
+                                    [-o DIR]
 
 Needs the development environment (`uv sync --extra blender`): uv tells which wheels uv.lock asks
 for, pip downloads them, and the builder and validator that Blender ships make the zip. Either
@@ -12,6 +13,9 @@ goes without it: inside Blender, maps are read through Blender's images, so conv
 works all the same. Only `blender --command sunsplit` needs it, for maps other than .exr, and
 finds it there if that Blender has OpenImageIO's Python module of its own. When any other wheel is
 missing, its zip is skipped with a sentence on stderr, and the exit status is 1.
+
+--python is for a Blender with another Python inside than blender.org builds it with, as Linux
+distributions have. The zip's name then ends with that Python.
 
 The zips need glibc 2.28 (as Blender does) or macOS 12 (as scipy's wheel does).
 """
@@ -52,7 +56,7 @@ DISPENSABLE = {("openimageio", "windows-arm64")}
 """(package, platform) where a zip without the wheel still works; see above."""
 
 PYTHONS = {"4.5": (3, 11), "5.2": (3, 13)}
-"""The Python inside each Blender."""
+"""The Python inside each Blender, as blender.org builds it."""
 
 
 class CannotBuild(Exception):
@@ -89,25 +93,35 @@ PLATFORMS = {
 
 @dataclass(frozen=True)
 class Target:
-    """What one zip is for."""
+    """What one zip is for. other_python: of a Blender that has not the Python of `PYTHONS`."""
 
     blender: str
     platform: str
+    other_python: tuple[int, int] | None = None
 
     def __str__(self) -> str:
-        return f"Blender {self.blender} on {self.platform}"
+        return f"Blender {self.blender}{self._other(' with Python {}.{}')} on {self.platform}"
 
     @property
-    def python(self) -> str:
-        return "{}.{}".format(*PYTHONS[self.blender])
+    def python(self) -> tuple[int, int]:
+        return self.other_python or PYTHONS[self.blender]
+
+    @property
+    def suffix(self) -> str:
+        """How the zip's name ends."""
+        return f"blender{self.blender}-{self.platform}{self._other('-python{}.{}')}"
+
+    def _other(self, text: str) -> str:
+        return text.format(*self.other_python) if self.other_python else ""
 
     def needs(self, package: dict) -> bool:
         """Whether a package of the lock belongs there."""
         if package["name"] in BLENDERS_OWN:
             return False
         markers = PLATFORMS[self.platform].markers | {
-            "python_version": self.python,
-            "python_full_version": f"{self.python}.0",
+            # Another Python gets wheels of the same versions: the lock knows only these Pythons.
+            "python_version": "{}.{}".format(*PYTHONS[self.blender]),
+            "python_full_version": "{}.{}.0".format(*PYTHONS[self.blender]),
             "implementation_name": "cpython",
             "platform_python_implementation": "CPython",
         }
@@ -115,11 +129,10 @@ class Target:
 
     def wheel_tags(self) -> list[Tag]:
         """Tags of wheels that run there, best first: pip's order."""
-        python, platforms = PYTHONS[self.blender], PLATFORMS[self.platform].tags
-        interpreter = "cp{}{}".format(*python)
+        platforms, interpreter = PLATFORMS[self.platform].tags, "cp{}{}".format(*self.python)
         return [
-            *cpython_tags(python, [interpreter], platforms),
-            *compatible_tags(python, interpreter, platforms),
+            *cpython_tags(self.python, [interpreter], platforms),
+            *compatible_tags(self.python, interpreter, platforms),
         ]
 
 
@@ -198,7 +211,7 @@ def download(wheels: Sequence[Wheel], target: Target, folder: Path) -> None:
         command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-input"]
         command += ["--disable-pip-version-check", "--no-deps", "--only-binary=:all:"]
         command += ["--require-hashes", "-r", str(wanted), "-d", str(folder)]
-        command += ["--python-version", target.python]
+        command += ["--python-version", "{}.{}".format(*target.python)]
         for tag in PLATFORMS[target.platform].tags:
             command += ["--platform", tag]
         _run(command, f"The wheels for {target} cannot be downloaded")
@@ -261,7 +274,7 @@ def build(target: Target, packages: Sequence[dict], output: Path) -> Path:
     download(wheels, target, cache)
     builder, tags = blenders_builder()
     known = tomllib.loads((ROOT / MANIFEST).read_text(encoding="utf-8"))
-    name = f"{known['id']}-{known['version']}-blender{target.blender}-{target.platform}.zip"
+    name = f"{known['id']}-{known['version']}-{target.suffix}.zip"
     output.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="sunsplit-") as temporary:
         stage(target, wheels, cache, Path(temporary))
@@ -291,12 +304,18 @@ def host() -> str:
     raise CannotBuild(f"There is no zip for this machine ({platform.platform()}).")
 
 
+def _version(text: str) -> tuple[int, int]:
+    major, minor = map(int, text.split("."))
+    return major, minor
+
+
 def _arguments(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--blender", action="append", choices=PYTHONS, help="default: all")
     parser.add_argument(
         "--platform", action="append", choices=[*PLATFORMS, "host"], help="default: all"
     )
+    parser.add_argument("--python", type=_version, metavar="3.N", help="default: Blender's own")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "dist", metavar="DIR")
     return parser.parse_args(arguments)
 
@@ -313,7 +332,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     skipped = False
     for blender, name in dict.fromkeys(product(chosen.blender or PYTHONS, names)):
         try:
-            path = build(Target(blender, name), packages, chosen.output)
+            path = build(Target(blender, name, chosen.python), packages, chosen.output)
             print(f"{path}  {path.stat().st_size / 1e6:.1f} MB", flush=True)
         except CannotBuild as error:
             print(error, file=sys.stderr)

@@ -1,0 +1,162 @@
+"""Sunsplit in a Blender's window, used with mouse and keyboard."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.benchmarks import window as benchmark
+from tests.gui.conftest import complaints
+from tests.gui.window import Window
+
+CONVERTED, RESTORED = "is_converted()", "not is_converted()"
+
+
+@pytest.fixture
+def before(window: Window) -> dict:
+    """The scene before anything is pressed."""
+    return window.ask("state()")
+
+
+@pytest.fixture
+def converted(window: Window, before: dict) -> dict:
+    """The scene after a click on the button."""
+    window.press("sunsplit.convert")
+    window.wait_for(CONVERTED)
+    return window.ask("state()")
+
+
+# Install and enable
+
+
+def test_installed_zip_shows_its_tab(window: Window, quiet: None):
+    assert all(window.ask("present()").values())
+    assert window.ask("category()") == "Sunsplit"
+    assert window.find("sunsplit.convert")
+
+
+def test_blender_of_debian_finds_the_zip_valid(opened: Window):
+    (package,) = opened.folder.glob("*.zip")
+    path = opened.debian.inside(package)
+    said = opened.debian.ask("blender", "--command", "extension", "validate", path)
+    assert "Success" in said
+
+
+def test_disabled_it_is_gone_and_enabled_back_again(window: Window, quiet: None):
+    window.ask("enable(False)")
+    window.settle()
+    assert not any(window.ask("present()").values())
+    window.ask("enable()", 120)
+    window.open_tab()
+    assert all(window.ask("present()").values())
+    assert window.find("sunsplit.convert")
+
+
+@pytest.mark.parametrize(
+    "action",
+    ["bpy.ops.script.reload()", "bpy.ops.wm.read_homefile(use_splash=False, load_ui=False)"],
+    ids=["reload scripts", "new file"],
+)
+def test_reload_and_new_file_keep_it(window: Window, converted: dict, action: str, quiet: None):
+    window.ask(f"[*{action}]", 120)
+    window.settle()
+    assert all(window.ask("present()").values())
+    window.open_tab()
+    assert window.find("sunsplit.convert")
+
+
+def test_blender_starts_and_ends_with_it_in_silence(opened: Window):
+    """At the end Blender unregisters what is enabled."""
+    here = opened.debian.inside(opened.folder)
+    module = "bl_ext.user_default.sunsplit"
+    code = f"import sys; print('loaded', {module!r} in sys.modules)"
+    options = ("--background", "--python-exit-code", "1", "--addons", module)
+    said = opened.debian.ask("blender", *options, "--python-expr", code, home=here)
+    assert "loaded True" in said
+    assert not complaints(said)
+
+
+# The button
+
+
+def test_click_converts_the_world(window: Window, before: dict, converted: dict, quiet: None):
+    assert not before["lamps"]
+    assert converted["lamps"]
+    assert converted["world"] != before["world"]
+    headline = converted["report"].splitlines()[0]
+    assert headline.startswith(f"{len(converted['lamps'])} lamp")
+    assert headline in window.ask("reports()")
+
+
+def test_one_undo_takes_it_back_and_redo_brings_it(
+    window: Window, before: dict, converted: dict, quiet: None
+):
+    window.key("ctrl+z")
+    window.wait_for(RESTORED)
+    assert window.ask("state()") == before
+    window.key("ctrl+shift+z")
+    window.wait_for(CONVERTED)
+    assert window.ask("state()") == converted
+    # What has been redone is as good as new.
+    window.press("sunsplit.restore")
+    window.wait_for(RESTORED)
+    assert window.ask("state()") == before
+
+
+def test_restore_and_its_undo(window: Window, before: dict, converted: dict, quiet: None):
+    window.press("sunsplit.restore")
+    window.wait_for(RESTORED)
+    assert window.ask("state()") == before
+    window.key("ctrl+z")
+    window.wait_for(CONVERTED)
+    assert window.ask("state()") == converted
+
+
+def test_restore_after_saving_and_opening(
+    window: Window, before: dict, converted: dict, quiet: None
+):
+    window.ask("save_scene('converted.blend')")
+    window.ask("open_scene('converted.blend')")
+    assert window.ask("state()") == converted
+    window.press("sunsplit.restore")
+    window.wait_for(RESTORED)
+    assert window.ask("state()") == before
+
+
+def test_a_world_without_a_map_is_refused_in_a_sentence(window: Window):
+    window.ask("[bpy.data.images.remove(bpy.data.images['sky.hdr']), remember_step('No map')]")
+    before, said = window.ask("state()"), window.ask("reports()")
+    window.press("sunsplit.convert")
+    window.wait_for(f"len(reports()) > {len(said)}")
+    sentence = window.ask("reports()")[-1]
+    assert "image" in sentence
+    assert "Traceback" not in window.console()
+    assert window.ask("state()") == before
+
+
+def test_without_a_world_the_button_is_grey(window: Window):
+    window.ask("[setattr(bpy.context.scene, 'world', None), remember_step('No world')]")
+    before = window.ask("state()")
+    assert not window.ask("bpy.ops.sunsplit.convert.poll()")
+    window.press("sunsplit.convert")
+    window.settle()
+    assert window.ask("state()") == before
+
+
+def test_a_setting_is_changed_with_the_mouse(window: Window, quiet: None):
+    window.unfold("SUNSPLIT_PT_settings")
+    window.press("sunsplit.share_auto")
+    window.wait_for("not bpy.context.scene.sunsplit.share_auto")
+
+
+# What it costs
+
+
+def test_benchmark(window: Window, sunrise: Path, quiet: None):
+    """A small version of the benchmark: that it measures, not how fast it is."""
+    results = benchmark.measure(window, [sunrise], redraws=3, repeats=1)
+    assert all(min(one.times) > 0 for one in results)
+    assert len(results[0].times) == 3
+    lines = benchmark.table(results, "5.2").splitlines()
+    assert sum(line.startswith("| ") for line in lines) == 2 + len(results)
