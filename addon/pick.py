@@ -35,7 +35,7 @@ def pick(context: bpy.types.Context, x: float, y: float, extend: bool) -> bpy.ty
     extend: what is selected stays so, and the active lamp becomes deselected, as Blender does it.
     None, and nothing changed, where there is no sun.
     """
-    found = _marks(context)
+    found = suns_on_screen(context)
     if found is None:
         return None
     suns, marks = found
@@ -58,7 +58,8 @@ def select(layer: bpy.types.ViewLayer, lamp: bpy.types.Object, extend: bool) -> 
     layer.objects.active = lamp
 
 
-def _marks(context: bpy.types.Context) -> tuple[ShownSuns, Marks] | None:
+def suns_on_screen(context: bpy.types.Context) -> tuple[ShownSuns, Marks] | None:
+    """Suns and where they are in the editor of a context; None where it shows none."""
     if context.space_data.type == "IMAGE_EDITOR":
         from .overlay_image import seen_map
 

@@ -19,6 +19,7 @@ from functools import wraps
 from pathlib import Path
 
 import bpy
+from mathutils import Euler
 
 FOLDER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.sunsplit"
@@ -283,6 +284,67 @@ def timed(work: Callable, name: str) -> Callable:
         DRAWN[name] = 1e3 * (time.perf_counter() - started)
 
     return draw
+
+
+# The overlay
+
+
+def look_at_sun(number: int, aside: float) -> None:
+    """Turn the 3D view to a lamp of the conversion, an angle in radians aside of it."""
+    lamp = bpy.context.scene.sunsplit.lamps[number].lamp
+    towards = Euler((0, 0, aside)).to_matrix() @ lamp.matrix_world.col[2].xyz
+    space = view().spaces.active
+    space.shading.type = "SOLID"
+    space.region_3d.view_perspective = "PERSP"
+    space.region_3d.view_rotation = (-towards).to_track_quat("Z", "Y")
+    region("WINDOW").tag_redraw()
+
+
+def suns_seen(kind: str = "VIEW_3D") -> list[list]:
+    """Name, x and y of each sun that an editor shows and that is in sight; rows downwards."""
+    area = next(area for area in window().screen.areas if area.type == kind)
+    inner = next(one for one in area.regions if one.type == "WINDOW")
+    with bpy.context.temp_override(window=window(), area=area, region=inner):
+        pick = importlib.import_module(f"{MODULE}.addon.pick")
+        suns, marks = pick.suns_on_screen(bpy.context)
+    rows = window().height - 1 - inner.y
+    places = marks.place[~marks.aside].round().astype(int).tolist()
+    names = [lamp.name for lamp, aside in zip(suns.lamps, marks.aside, strict=True) if not aside]
+    return [[name, inner.x + x, rows - y] for name, (x, y) in zip(names, places, strict=True)]
+
+
+def selected() -> list[str]:
+    return sorted(one.name for one in window().view_layer.objects.selected)
+
+
+def show_overlay(on: bool) -> None:
+    bpy.context.scene.sunsplit.show_overlay = on
+    for area in window().screen.areas:
+        area.tag_redraw()
+
+
+def viewport_render(name: str) -> None:
+    """Blender's own render of the 3D view, into the folder."""
+    bpy.context.scene.render.filepath = str(FOLDER / name)
+    with bpy.context.temp_override(window=window(), area=view(), region=region("WINDOW")):
+        bpy.ops.render.opengl(write_still=True, view_context=True)
+
+
+def show_map(name: str) -> None:
+    """An image in an Image editor, in the 3D view's place."""
+    area = view()
+    area.type = "IMAGE_EDITOR"
+    area.spaces.active.image = bpy.data.images[name]
+    inner = next(one for one in area.regions if one.type == "WINDOW")
+    with bpy.context.temp_override(window=window(), area=area, region=inner):
+        bpy.ops.image.view_all(fit_view=True)
+
+
+def show_view() -> None:
+    """The 3D view in its place again."""
+    for area in window().screen.areas:
+        if area.type == "IMAGE_EDITOR":
+            area.type = "VIEW_3D"
 
 
 main()

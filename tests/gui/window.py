@@ -129,6 +129,13 @@ class Window:
         self.settle()
         self._do("click", 1)
 
+    def hold(self, key: str) -> None:
+        self._do("keydown", key)
+        self.settle()
+
+    def release(self, key: str) -> None:
+        self._do("keyup", key)
+
     def key(self, name: str) -> None:
         """Press a key over the 3D view, as `ctrl+z` or `Escape`."""
         left, top, width, height = self.ask("place('WINDOW')")
