@@ -5,7 +5,7 @@ import sys
 
 import bpy
 
-from . import command, operators, overlay, panel, properties
+from . import command, operators, overlay, panel, presets, properties
 
 CLASSES = (
     properties.SunsplitLamp,
@@ -13,9 +13,19 @@ CLASSES = (
     properties.SunsplitSettings,
     operators.SUNSPLIT_OT_convert,
     operators.SUNSPLIT_OT_restore,
+    operators.SUNSPLIT_OT_reset_factors,
+    operators.SUNSPLIT_OT_select_suns,
+    presets.SUNSPLIT_OT_add_preset,
+    panel.SUNSPLIT_PT_presets,
     overlay.SUNSPLIT_OT_pick_sun,
     panel.SUNSPLIT_PT_main,
+    panel.SUNSPLIT_PT_suns,
     panel.SUNSPLIT_PT_settings,
+    panel.SUNSPLIT_PT_advanced,
+    panel.SUNSPLIT_PT_world,
+    panel.SUNSPLIT_PT_world_suns,
+    panel.SUNSPLIT_PT_world_settings,
+    panel.SUNSPLIT_PT_world_advanced,
 )
 
 
@@ -24,6 +34,7 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.types.Scene.sunsplit = bpy.props.PointerProperty(type=properties.SunsplitSettings)
     command.register()
+    presets.register()
     overlay.register()
     # Blender unregisters its add-ons when it ends. As a Python module it does not, and 4.5 then
     # hangs or crashes over any operator or panel that is left.
@@ -36,6 +47,7 @@ def unregister() -> None:
     if not hasattr(bpy.types.Scene, "sunsplit"):
         return  # Blender disables an extension when it ends, after what `register` has asked for.
     overlay.unregister()
+    presets.unregister()
     command.unregister()
     del bpy.types.Scene.sunsplit
     for cls in reversed(CLASSES):

@@ -1,7 +1,7 @@
 """What is known of the map that was converted last: nothing is found out twice.
 
-A map is known by its pixels, wherever they come from, so an image that was changed or loaded again
-is never taken for what it was.
+A map is known by its file, as it was written last, or by its pixels where they come from anywhere
+else: an image that was changed or loaded again is never taken for what it was.
 """
 
 from __future__ import annotations
@@ -9,17 +9,20 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.conversion import Conversion, convert
 from ..core.environment import EnvironmentMap
+from ..core.progress import Progress, silent
 from ..core.settings import ConversionSettings
 from ..core.visible import VisiblePart
 
 MOST_BYTES = 2**28
-"""Of a map's pixels: what is larger, 8k and up, is not kept in memory."""
+"""Of pixels in memory: a map of more, 8k and up, is not kept. Of a file only what it was narrowed
+to is held anyway."""
 
 _BLOCK = 2**16
 """Numbers that are summed into one by a fingerprint."""
@@ -47,7 +50,17 @@ def known_map(
     if pixels.nbytes > MOST_BYTES:
         forget()
         return read()
-    fingerprint = f"{name} {pixels.size} {_fingerprint(pixels)}"
+    return _known_or_read(f"{name} {pixels.size} {_fingerprint(pixels)}", read)
+
+
+def known_file(path: Path, name: str, read: Callable[[], EnvironmentMap]) -> EnvironmentMap:
+    """The map of a file, with all that is known of it, or else what `read` makes of it. A file is
+    another one when it was written again."""
+    at = path.stat()
+    return _known_or_read(f"{name} {path} {at.st_ino} {at.st_size} {at.st_mtime_ns}", read)
+
+
+def _known_or_read(fingerprint: str, read: Callable[[], EnvironmentMap]) -> EnvironmentMap:
     if not _last or _last[0].fingerprint != fingerprint:
         environment = read()
         _last[:] = [_Known(fingerprint, environment)]
@@ -55,14 +68,17 @@ def known_map(
 
 
 def known_conversion(
-    environment: EnvironmentMap, settings: ConversionSettings, visible: VisiblePart | None
+    environment: EnvironmentMap,
+    settings: ConversionSettings,
+    visible: VisiblePart | None,
+    progress: Progress = silent,
 ) -> Conversion:
     """A conversion of a map, the last one if it is the same."""
     made_for = settings, visible.key if visible else None
     for known in _last:
         if known.environment is environment and known.made_for == made_for and known.conversion:
             return known.conversion
-    conversion = convert(environment, settings, visible=visible)
+    conversion = convert(environment, settings, progress, visible)
     _last[:] = [
         _Known(known.fingerprint, environment, made_for, conversion)
         for known in _last

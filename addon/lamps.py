@@ -9,45 +9,78 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
+from ..core.environment import LUMINANCE_WEIGHTS
 from ..core.suns import Sun
-from .trace import TAG
+from .controls import SOFTNESS, STRENGTH, WARMTH
+from .driven import Formula
+from .rig import SKY, Rig, rig_of
+from .trace import TAG, constant
 from .world import WorldLight
 
 COLLECTION = "Sunsplit Suns"
 
 
+FARTHEST = 5.0
+"""Where lamps stand, from the origin: apart, and out of the way. It matters to nothing but the eye,
+as a sun shines from everywhere."""
+
+LEAST_WHOLE = 0.01
+"""Of all light: below, a lamp's name says tenths of a percent."""
+
+WARMER = 2.15
+"""What one step of warmth divides a colour temperature by: 6500 to 3000 K."""
+
+
 def make_lamps(
-    suns: Sequence[Sun], light: WorldLight, world: bpy.types.World
+    suns: Sequence[Sun], light: WorldLight, rig: Rig, world: bpy.types.World
 ) -> list[bpy.types.Object]:
     """One lamp for each sun, aimed and tinted as the world shows the map; in no collection yet.
 
-    What the world does to rays of each kind, its lamps do too.
+    light: of `world`, the converted one: what it does to rays of each kind, its lamps do too.
     """
     lamps = []
     for sun in suns:
         data = _lamp_data(sun.irradiance * light.gain, sun.angular_diameter)
+        _follow_factors(data, rig.sky, light)
         lamp = bpy.data.objects.new(data.name, data)
         lamp[TAG] = True
-        _aim(lamp, light.map_from_world.T @ sun.to_light)
+        lamp.parent = rig.holder
+        to_light = rig.from_map @ sun.to_light
+        _aim(lamp, to_light)
+        lamp.location = FARTHEST * to_light / np.linalg.norm(to_light)
         _set_visibility(lamp, world)
         lamps.append(lamp)
     return lamps
 
 
-def link_lamps(scene: bpy.types.Scene, lamps: Sequence[bpy.types.Object]) -> bpy.types.Collection:
-    """Put lamps into a new collection of a scene, named by their rank."""
+def link_lamps(
+    scene: bpy.types.Scene, rig: Rig, lamps: Sequence[bpy.types.Object]
+) -> bpy.types.Collection:
+    """Put lamps and what holds them into a new collection of a scene."""
     collection = bpy.data.collections.new(COLLECTION)
     collection[TAG] = True
     scene.collection.children.link(collection)
-    for rank, lamp in enumerate(lamps, start=1):
-        lamp.name = lamp.data.name = f"Sunsplit Sun {rank}"
-        collection.objects.link(lamp)
+    for thing in (*rig_of(rig.sky), *lamps):
+        collection.objects.link(thing)
     return collection
+
+
+def name_lamps(
+    suns: Sequence[Sun], lamps: Sequence[bpy.types.Object], rig: Rig, whole: float
+) -> None:
+    """Name lamps by rank and share of all light, and their rig, once older ones of these names are
+    gone. whole: luminance of all light of the map, integrated over the sphere."""
+    for empty in rig_of(rig.sky):
+        empty.name = SKY
+    for rank, (sun, lamp) in enumerate(zip(suns, lamps, strict=True), start=1):
+        share = float(sun.scalar_irradiance @ LUMINANCE_WEIGHTS) / whole
+        percent = f"{share:.0%}" if share >= LEAST_WHOLE else f"{share:.1%}"
+        lamp.name = lamp.data.name = f"Sun {rank} ({percent[:-1]} %)"
 
 
 def _lamp_data(irradiance: NDArray[np.float64], diameter: float) -> bpy.types.Light:
     """A sun lamp of this normal irradiance, (3,), and angular diameter; nothing left to chance."""
-    data = bpy.data.lights.new("Sunsplit Sun", "SUN")
+    data = bpy.data.lights.new("Sun", "SUN")
     data[TAG] = True
     strength = float(irradiance.max())
     data.energy = strength
@@ -60,6 +93,25 @@ def _lamp_data(irradiance: NDArray[np.float64], diameter: float) -> bpy.types.Li
     data.diffuse_factor = data.specular_factor = data.transmission_factor = 1.0
     data.volume_factor = 1.0
     return data
+
+
+def _follow_factors(data: bpy.types.Light, sky: bpy.types.Object, light: WorldLight) -> None:
+    """Let a lamp follow what all suns are changed by, and the world's strength. What the user may
+    want to set for one lamp, its strength and colour, stays free."""
+    formula = Formula()
+    strength = formula.property("OBJECT", sky, f'["{STRENGTH.name}"]')
+    if light.strength is not None:
+        now = float(constant(light.strength)[0])
+        strength = f"{strength}*({formula.input(light.strength)})/{now!r}"
+    formula.drive(data, "exposure", -1, f"log(max({strength},1e-9),2)", 0.0)
+    warmth = formula.property("OBJECT", sky, f'["{WARMTH.name}"]')
+    formula.drive(data, "use_temperature", -1, f"{warmth} != 0", False)
+    formula.drive(data, "temperature", -1, f"6500*pow({WARMER},-{warmth})", 6500.0)
+    if data.angle:
+        data["measured_angle"] = data.angle
+        angle = formula.property("LIGHT", data, '["measured_angle"]')
+        softness = formula.property("OBJECT", sky, f'["{SOFTNESS.name}"]')
+        formula.drive(data, "angle", -1, f"min({angle}*{softness},pi)", data.angle)
 
 
 def _aim(lamp: bpy.types.Object, to_light: NDArray[np.float64]) -> None:
@@ -125,3 +177,28 @@ def _move_out(
     for child in collection.children:
         if child.name not in scene.collection.children:
             scene.collection.children.link(child)
+
+
+def suns_that_are(
+    state: bpy.types.PropertyGroup, which: str, limit: float
+) -> list[bpy.types.Object]:
+    """Lamps of a conversion, the brightest first: "all", the "brightest", or those that are "sharp"
+    or "soft", narrower than a limit in radians or not."""
+    lamps = [entry.lamp for entry in state.lamps if entry.lamp]
+    if which == "brightest":
+        return lamps[:1]
+    if which in ("sharp", "soft"):
+        return [lamp for lamp in lamps if (lamp.data.angle < limit) == (which == "sharp")]
+    return lamps
+
+
+def select_lamps(context: bpy.types.Context, lamps: Sequence[bpy.types.Object]) -> None:
+    """Select these lamps and nothing else, the first of them the active one."""
+    shown = context.view_layer.objects
+    for thing in shown.selected:
+        thing.select_set(False)
+    lamps = [lamp for lamp in lamps if lamp.name in shown]
+    for lamp in lamps:
+        lamp.select_set(True)
+    if lamps:
+        shown.active = lamps[0]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Vector
@@ -11,6 +13,48 @@ from .trace import Input, Place, cannot_follow, constant, ends_at
 
 Matrix3 = NDArray[np.float64]
 
+AXES = {"X_AXIS": (1, 0, 0), "Y_AXIS": (0, 1, 0), "Z_AXIS": (0, 0, 1)}
+
+
+@dataclass(frozen=True, eq=False)
+class Rotation:
+    """What a node turns directions by, and where that comes from, so that others can follow.
+
+    angles: Euler angles XYZ; or one angle about `axis`, which is an input or fixed. undone: it is
+    the inverse that the node applies.
+    """
+
+    angles: Input
+    axis: Input | tuple[float, float, float] | None = None
+    undone: bool = False
+
+    @property
+    def matrix(self) -> Matrix3:
+        """As it is now, (3, 3)."""
+        if self.axis is None:
+            matrix = _euler(constant(self.angles))
+        else:
+            axis = constant(self.axis) if isinstance(self.axis, Input) else self.axis
+            angle = float(constant(self.angles)[0])
+            matrix = np.array(Matrix.Rotation(angle, 3, Vector(axis)), dtype=np.float64)
+        return matrix.T if self.undone else matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """What one node does to directions on their way from the world to the map: `before`, (3, 3),
+    then a rotation, then `after`, (3, 3)."""
+
+    before: Matrix3 = field(default_factory=lambda: np.eye(3))
+    rotation: Rotation | None = None
+    after: Matrix3 = field(default_factory=lambda: np.eye(3))
+
+    @property
+    def matrix(self) -> Matrix3:
+        """Of all three, as they are now, (3, 3)."""
+        turned = self.rotation.matrix @ self.before if self.rotation else self.before
+        return self.after @ turned
+
 
 def map_from_world(texture: Place) -> Matrix3:
     """The rotation (or rotation and mirror), (3, 3), from world to map directions.
@@ -18,8 +62,16 @@ def map_from_world(texture: Place) -> Matrix3:
     It undoes nothing: `matrix @ world_direction = map_direction`, so a light that the map shows at
     d shines from `matrix.T @ d`. Raises UnusableInput for what bends or shifts the map.
     """
-    legacy = _legacy(texture.node)
-    return _rigid(texture.node, legacy @ _vector(texture.input("Vector"), texture.node))
+    matrix = np.eye(3)
+    for turn in turns(texture):
+        matrix = turn.matrix @ matrix
+    return _rigid(texture.node, matrix)
+
+
+def turns(texture: Place) -> list[Turn]:
+    """What directions pass on their way to the map, in that order. Raises UnusableInput."""
+    found = _turns(texture.input("Vector"), texture.node)
+    return [*found, Turn(_legacy(texture.node))]
 
 
 def _rigid(node: bpy.types.Node, matrix: Matrix3) -> Matrix3:
@@ -34,10 +86,10 @@ def _rigid(node: bpy.types.Node, matrix: Matrix3) -> Matrix3:
     raise cannot_follow(node, "is stretched by its mapping")
 
 
-def _vector(at: Input, texture: bpy.types.Node) -> Matrix3:
+def _turns(at: Input, texture: bpy.types.Node) -> list[Turn]:
     end = ends_at(at)
     if end.socket == texture.inputs["Vector"]:
-        return np.eye(3)  # a texture without coordinates takes the direction of the ray
+        return []  # a texture without coordinates takes the direction of the ray
     if isinstance(end, Input):
         raise cannot_follow(end.socket.node, "has nothing linked to its Vector")
     output = end
@@ -48,35 +100,34 @@ def _vector(at: Input, texture: bpy.types.Node) -> Matrix3:
         )
         if not plain or node.from_instancer:
             raise cannot_follow(node, f"gives {output.socket.name} coordinates")
-        return np.eye(3)
+        return []
     if node.type == "MAPPING":
-        return _mapping(place) @ _vector(place.input("Vector"), texture)
+        return [*_turns(place.input("Vector"), texture), _mapping(place)]
     if node.type == "VECTOR_ROTATE":
-        return _vector_rotate(place) @ _vector(place.input("Vector"), texture)
+        return [*_turns(place.input("Vector"), texture), _vector_rotate(place)]
     if node.type == "VECT_MATH":
-        return _vector_math(place) @ _vector(place.input(0), texture)
+        return [*_turns(place.input(0), texture), _vector_math(place)]
     raise cannot_follow(node, "bends the map")
 
 
-def _mapping(place: Place) -> Matrix3:
+def _mapping(place: Place) -> Turn:
     node = place.node
-    rotation = _euler(constant(place.input("Rotation")))
-    scale = constant(place.input("Scale"))
+    rotation = Rotation(place.input("Rotation"), undone=node.vector_type == "TEXTURE")
     if node.vector_type in ("POINT", "TEXTURE") and constant(place.input("Location")).any():
         raise cannot_follow(node, "shifts the map's directions by its Location")
-    return _transform(node, node.vector_type, rotation, scale)
+    scale = _scale(node, node.vector_type, constant(place.input("Scale")))
+    if node.vector_type == "TEXTURE":
+        return Turn(rotation=rotation, after=scale)
+    return Turn(scale, rotation)
 
 
-def _transform(
-    node: bpy.types.Node, kind: str, rotation: Matrix3, scale: NDArray[np.float64]
-) -> Matrix3:
-    if kind in ("NORMAL", "TEXTURE") and not scale.all():
-        raise cannot_follow(node, "has a Scale of 0")
-    if kind == "TEXTURE":
-        return np.diag(1 / scale) @ rotation.T
-    if kind == "NORMAL":
-        return rotation @ np.diag(1 / scale)
-    return rotation @ np.diag(scale)
+def _scale(node: bpy.types.Node, kind: str, scale: NDArray[np.float64]) -> Matrix3:
+    """What a mapping of a kind scales directions by, (3, 3)."""
+    if kind in ("NORMAL", "TEXTURE"):
+        if not scale.all():
+            raise cannot_follow(node, "has a Scale of 0")
+        return np.diag(1 / scale)
+    return np.diag(scale)
 
 
 def _legacy(node: bpy.types.Node) -> Matrix3:
@@ -90,34 +141,31 @@ def _legacy(node: bpy.types.Node) -> Matrix3:
     for row, axis in enumerate((mapping.mapping_x, mapping.mapping_y, mapping.mapping_z)):
         if axis != "NONE":
             axes[row, "XYZ".index(axis)] = 1
-    scale = np.array(mapping.scale, dtype=np.float64)
+    scale = _scale(node, mapping.vector_type, np.array(mapping.scale, dtype=np.float64))
     rotation = _euler(np.array(mapping.rotation))
-    return _transform(node, mapping.vector_type, rotation, scale) @ axes
+    if mapping.vector_type == "TEXTURE":
+        return scale @ rotation.T @ axes
+    return rotation @ scale @ axes
 
 
-def _vector_rotate(place: Place) -> Matrix3:
+def _vector_rotate(place: Place) -> Turn:
     node = place.node
     if constant(place.input("Center")).any():
         raise cannot_follow(node, "turns the map about a shifted centre")
-    kind = node.rotation_type
-    if kind == "EULER_XYZ":
-        matrix = _euler(constant(place.input("Rotation")))
-    else:
-        axes = {"X_AXIS": (1, 0, 0), "Y_AXIS": (0, 1, 0), "Z_AXIS": (0, 0, 1)}
-        axis = axes.get(kind) or tuple(constant(place.input("Axis")))
-        angle = float(constant(place.input("Angle"))[0])
-        matrix = np.array(Matrix.Rotation(angle, 3, Vector(axis)))
-    return matrix.T if node.invert else matrix
+    if node.rotation_type == "EULER_XYZ":
+        return Turn(rotation=Rotation(place.input("Rotation"), undone=node.invert))
+    axis = AXES.get(node.rotation_type) or place.input("Axis")
+    return Turn(rotation=Rotation(place.input("Angle"), axis, undone=node.invert))
 
 
-def _vector_math(place: Place) -> Matrix3:
+def _vector_math(place: Place) -> Turn:
     operation = place.node.operation
     if operation == "NORMALIZE":
-        return np.eye(3)
+        return Turn()
     if operation == "SCALE":
-        return np.eye(3) * constant(place.input("Scale"))[0]
+        return Turn(np.eye(3) * constant(place.input("Scale"))[0])
     if operation == "MULTIPLY":
-        return np.diag(constant(place.input(1)))
+        return Turn(np.diag(constant(place.input(1))))
     raise cannot_follow(place.node, f"does {operation.title()} on the map's directions")
 
 

@@ -1,12 +1,21 @@
 """Operators: read the settings, call a plain function, report. A few lines each."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import bpy
+from bpy.props import EnumProperty, FloatProperty
 
-from ..core.errors import SunsplitError
+from .modal import InSteps
 from .properties import CHOICES
+from .steps import Steps
+
+if TYPE_CHECKING:
+    from .scene import SceneConversion
 
 
-class SUNSPLIT_OT_convert(bpy.types.Operator):
+class SUNSPLIT_OT_convert(InSteps, bpy.types.Operator):
     """Turn the brightest lights of the world's HDRI into sun lamps and keep the rest as world"""
 
     bl_idname = "sunsplit.convert"
@@ -14,34 +23,35 @@ class SUNSPLIT_OT_convert(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     __annotations__ = CHOICES
+    home = ".scene"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if context.scene.world is None:
             cls.poll_message_set("The scene has no world: add one with an HDRI first")
             return False
-        return True
+        return _is_editable(cls, context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        from .scene import convert_scene, options_for, settings_for
+    def work(self, context: bpy.types.Context) -> Steps[SceneConversion]:
+        from .scene import conversion_steps, options_for, settings_for
 
         chosen = self._chosen(context.scene.sunsplit)
-        try:
-            result = convert_scene(context.scene, settings_for(chosen), options_for(chosen))
-        except SunsplitError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        for name, value in chosen.items():
+        return conversion_steps(context.scene, settings_for(chosen), options_for(chosen))
+
+    def done(self, context: bpy.types.Context, result: SceneConversion) -> set[str]:
+        for name, value in self._chosen(context.scene.sunsplit).items():
             setattr(context.scene.sunsplit, name, value)
             setattr(self, name, value)  # Adjust Last Operation shows what was used
         self.report({"INFO"}, result.headline)
         return {"FINISHED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        from .panel import draw_settings
+        from .panel import draw_advanced, draw_settings
 
         self.layout.use_property_split = True
         draw_settings(self.layout, self)
+        self.layout.separator()
+        draw_advanced(self.layout, self)
 
     def _chosen(self, scene_settings: bpy.types.PropertyGroup) -> dict[str, object]:
         """The scene's settings, and before them what was given as an argument."""
@@ -63,13 +73,90 @@ class SUNSPLIT_OT_restore(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not context.scene.sunsplit.is_converted:
-            cls.poll_message_set("This scene's world is not converted")
-            return False
-        return True
+        return _is_converted(cls, context) and _is_editable(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         from .scene import restore_scene
 
         restore_scene(context.scene)
         return {"FINISHED"}
+
+
+class SUNSPLIT_OT_reset_factors(bpy.types.Operator):
+    """Set strength, warmth and softness of all suns back to what was measured"""
+
+    bl_idname = "sunsplit.reset_factors"
+    bl_label = "As Measured"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.scene.sunsplit.sky is None:
+            cls.poll_message_set("There are no suns to reset: convert the world first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        from .controls import reset_factors
+
+        reset_factors(context.scene.sunsplit.sky)
+        return {"FINISHED"}
+
+
+class SUNSPLIT_OT_select_suns(bpy.types.Operator):
+    """Select sun lamps by how much light they give or how wide they are"""
+
+    bl_idname = "sunsplit.select_suns"
+    bl_label = "Select Suns"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    __annotations__ = {
+        "which": EnumProperty(
+            name="Which",
+            items=[
+                ("all", "All", "All suns"),
+                ("brightest", "Brightest", "The one that gives most light"),
+                ("sharp", "Sharp", "Narrower than the limit: hard shadows"),
+                ("soft", "Soft", "As wide as the limit or wider: soft shadows"),
+            ],
+        ),
+        "limit": FloatProperty(
+            name="Limit",
+            description="Angular diameter between sharp and soft suns",
+            subtype="ANGLE",
+            default=0.0872664626,  # 5 degrees
+            min=0.0,
+            max=3.14159265,
+        ),
+    }
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Suns are selected in Object Mode")
+            return False
+        return _is_converted(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        from .lamps import select_lamps, suns_that_are
+
+        found = suns_that_are(context.scene.sunsplit, self.which, self.limit)
+        select_lamps(context, found)
+        self.report({"INFO"}, f"{len(found)} selected")
+        return {"FINISHED"} if found else {"CANCELLED"}
+
+
+def _is_converted(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    if not context.scene.sunsplit.is_converted:
+        operator.poll_message_set("This scene's world is not converted")
+        return False
+    return True
+
+
+def _is_editable(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    if context.scene.library is not None:
+        operator.poll_message_set(
+            "The scene is linked from another file: open that, or make the scene local"
+        )
+        return False
+    return True

@@ -1,93 +1,216 @@
-"""The tab "Sunsplit" in the sidebar of the 3D view."""
+"""The tab "Sunsplit" in the sidebar of the 3D view, and the same in the World properties.
+
+One button that does the right thing; below it what came of it, in words; then what an artist may
+turn, tint and soften. Settings are folded away.
+"""
+
+from __future__ import annotations
 
 import textwrap
 
 import bpy
+from bl_ui.utils import PresetPanel
+
+from .controls import FACTORS, changed_factors, rotation_control
+from .jobs import Job
 
 CHARACTER = 6.5
 """Width of a character of Blender's interface font in pixels at scale 1, on average and a bit."""
 
+MARGINS = 60
+"""Pixels of a region's width, at scale 1, that text in a box cannot use."""
 
-class SUNSPLIT_PT_main(bpy.types.Panel):
-    bl_idname = "SUNSPLIT_PT_main"
-    bl_label = "Sunsplit"
+
+class _InSidebar:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Sunsplit"
 
+
+class _InWorld:
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "world"
+
+
+class _Main:
+    bl_label = "Sunsplit"
+
     def draw(self, context: bpy.types.Context) -> None:
         settings = context.scene.sunsplit
-        converted = settings.is_converted
+        if Job.running:
+            _draw_progress(self.layout, Job.running)
+            return
         column = self.layout.column()
         column.scale_y = 1.6
-        text = "Convert Again" if converted else "Convert World"
+        text = "Convert Again" if settings.is_converted else "Convert World"
         column.operator("sunsplit.convert", text=text, icon="LIGHT_SUN")
-        if converted:
+        if settings.is_converted:
             self.layout.operator("sunsplit.restore", icon="LOOP_BACK")
         if settings.report:
-            box = self.layout.box().column(align=True)
-            for sentence in settings.report.splitlines():
-                for line in textwrap.wrap(sentence, _characters(context)):
-                    box.label(text=line)
+            _draw_report(self.layout, settings.report, _characters(context))
+
+
+class _Suns:
+    bl_label = "Suns"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.scene.sunsplit.sky is not None and not Job.running
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = context.scene.sunsplit
+        sky, layout = settings.sky, self.layout
+        layout.use_property_split = True
+        _draw_rotation(layout, settings)
+        for factor in FACTORS:
+            layout.prop(sky, f'["{factor.name}"]', text=factor.label, slider=True)
+        _draw_state(layout, sky)
+        if len(settings.lamps) > 1:
+            row = layout.row(align=True)
+            row.label(text="Select")
+            for which in ("all", "brightest", "sharp", "soft"):
+                operator = row.operator("sunsplit.select_suns", text=which.title())
+                operator.which = which
+
+
+class _Settings:
+    bl_label = "Settings"
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return not Job.running
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        SUNSPLIT_PT_presets.draw_panel_header(self.layout)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        draw_settings(self.layout, context.scene.sunsplit)
+
+
+class _Advanced:
+    bl_label = "Advanced"
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        draw_advanced(self.layout, context.scene.sunsplit)
+
+
+class SUNSPLIT_PT_presets(PresetPanel, bpy.types.Panel):
+    bl_label = "Sunsplit Presets"
+    preset_subdir = "sunsplit"
+    preset_operator = "script.execute_preset"
+    preset_add_operator = "sunsplit.add_preset"
+
+
+class SUNSPLIT_PT_main(_InSidebar, _Main, bpy.types.Panel):
+    pass
+
+
+class SUNSPLIT_PT_suns(_InSidebar, _Suns, bpy.types.Panel):
+    bl_parent_id = "SUNSPLIT_PT_main"
+
+
+class SUNSPLIT_PT_settings(_InSidebar, _Settings, bpy.types.Panel):
+    bl_parent_id = "SUNSPLIT_PT_main"
+
+
+class SUNSPLIT_PT_advanced(_InSidebar, _Advanced, bpy.types.Panel):
+    bl_parent_id = "SUNSPLIT_PT_settings"
+
+
+class SUNSPLIT_PT_world(_InWorld, _Main, bpy.types.Panel):
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+
+class SUNSPLIT_PT_world_suns(_InWorld, _Suns, bpy.types.Panel):
+    bl_parent_id = "SUNSPLIT_PT_world"
+
+
+class SUNSPLIT_PT_world_settings(_InWorld, _Settings, bpy.types.Panel):
+    bl_parent_id = "SUNSPLIT_PT_world"
+
+
+class SUNSPLIT_PT_world_advanced(_InWorld, _Advanced, bpy.types.Panel):
+    bl_parent_id = "SUNSPLIT_PT_world_settings"
+
+
+def _draw_progress(layout: bpy.types.UILayout, job: Job) -> None:
+    layout.progress(factor=job.fraction, text=job.stage.capitalize() or "Sunsplit")
+    layout.label(text="Cancel", icon="EVENT_ESC")
+
+
+def _draw_report(layout: bpy.types.UILayout, report: str, characters: int) -> None:
+    box = layout.box().column(align=True)
+    for number, sentence in enumerate(report.splitlines()):
+        for part, line in enumerate(textwrap.wrap(sentence, characters)):
+            box.label(text=line, icon="LIGHT_SUN" if number == part == 0 else "NONE")
+
+
+def _draw_rotation(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    """The input of the world that turns the map, and with it the lamps."""
+    control = rotation_control(settings)
+    if control is None:
+        layout.label(text="The world's nodes turn map and suns", icon="INFO")
+        return
+    socket, component = control
+    layout.prop(socket, "default_value", index=component, text="Rotation")
+
+
+def _draw_state(layout: bpy.types.UILayout, sky: bpy.types.Object) -> None:
+    """Whether the light is the map's or the artist's."""
+    changed = changed_factors(sky)
+    row = layout.row()
+    if changed:
+        row.label(text="Artistic: not the map's light any more", icon="BRUSH_DATA")
+        row.operator("sunsplit.reset_factors", icon="LOOP_BACK")
+    else:
+        row.label(text="Exact: the light of the map", icon="CHECKMARK")
 
 
 def _characters(context: bpy.types.Context) -> int:
     """How many fit into a line of the panel: labels do not wrap, they lose their middle."""
-    margins = 60
-    width = context.region.width / context.preferences.system.ui_scale - margins
+    width = context.region.width / context.preferences.system.ui_scale - MARGINS
     return max(int(width / CHARACTER), 20)
 
 
-class SUNSPLIT_PT_settings(bpy.types.Panel):
-    bl_idname = "SUNSPLIT_PT_settings"
-    bl_label = "Settings"
-    bl_parent_id = "SUNSPLIT_PT_main"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Sunsplit"
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
-
-    def draw(self, context: bpy.types.Context) -> None:
-        settings = context.scene.sunsplit
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        draw_settings(layout, settings)
-
-
 def draw_settings(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-    """The choices of a scene or of the operator; what has no effect now is left out or grey."""
-    sampled = settings.method != "edge"
+    """What most users may want to choose."""
     layout.prop(settings, "target")
-    layout.prop(settings, "method")
     layout.prop(settings, "lights")
     layout.prop(settings, "tolerance")
-    layout.prop(settings, "shape")
-    layout.prop(settings, "share_auto")
-    _row(layout, settings, "share", not settings.share_auto)
-    layout.prop(settings, "fill")
-    _row(layout, settings, "strata", sampled and settings.per_stratum)
+    layout.prop(settings, "skips")
+
+
+def draw_advanced(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    """The other choices; what has no effect with those above it is left out."""
+    sampled = settings.method != "edge"
+    layout.prop(settings, "method")
     if sampled:
-        layout.prop(settings, "per_stratum")
         layout.prop(settings, "samples")
         layout.prop(settings, "position")
+        layout.prop(settings, "per_stratum")
+        if settings.per_stratum:
+            layout.prop(settings, "strata")
+    layout.prop(settings, "shape")
+    layout.separator()
+    layout.prop(settings, "share_auto")
+    if not settings.share_auto:
+        layout.prop(settings, "share")
+    layout.prop(settings, "fill")
+    if settings.share_auto or settings.share < 1:
+        layout.prop(settings, "residual")
+        if settings.residual == "voronoi":
+            layout.prop(settings, "residual_samples")
+        if settings.residual != "none":
+            layout.prop(settings, "residual_width")
     if sampled or settings.residual == "voronoi":
         layout.prop(settings, "frequency")
     layout.separator()
-    rest = settings.share_auto or settings.share < 1
-    _row(layout, settings, "residual", rest)
-    if settings.residual == "voronoi":
-        _row(layout, settings, "residual_samples", rest)
-    if settings.residual != "none":
-        _row(layout, settings, "residual_width", rest)
-    layout.separator()
-    for name in ("skips", "two_passes", "light_groups"):
-        layout.prop(settings, name)
-
-
-def _row(
-    layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, name: str, active: bool
-) -> None:
-    row = layout.row()
-    row.active = active
-    row.prop(settings, name)
+    layout.prop(settings, "two_passes")
+    layout.prop(settings, "light_groups")

@@ -251,6 +251,9 @@ class SunsplitSettings(bpy.types.PropertyGroup):
             type=bpy.types.Collection, name="Suns", description="What holds the lamps"
         ),
         "lamps": CollectionProperty(type=SunsplitLamp),
+        "sky": PointerProperty(
+            type=bpy.types.Object, name="Sky", description="What turns the lamps with the world"
+        ),
         "light_tree_off": BoolProperty(
             name="Light Tree Off", description="Restore switches Cycles' light tree on again"
         ),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import bpy
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..core.visible import Looks
 from .passes import users_layers
+from .steps import Steps
 
 PICTURE = 48, 27
 """Rays through a camera's picture that look for the world."""
@@ -119,36 +121,41 @@ class Reach:
     random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
 
     @classmethod
-    def of(cls, sight: Sight) -> Reach:
+    def steps(cls, sight: Sight) -> Steps[Reach]:
+        """Paths are followed until enough of the scene is known."""
         found = cls(sight)
         for _ in range(PATHS):
             if len(found.places) >= PLACES:
                 break
             found._follow_another()
+            yield
         return found
 
-    def looks(self, to_map: NDArray[np.float64]) -> Looks:
-        """In the axes of a map; to_map: rotation (3, 3) from the scene's."""
+    def looks(self, to_map: NDArray[np.float64], run: Callable[[Steps], Any]) -> Looks:
+        """In the axes of a map; to_map: rotation (3, 3) from the scene's. run: runs steps where
+        rays may be cast, and returns their result."""
         return Looks(
             np.array(self.escaped, dtype=np.float64).reshape(-1, 3) @ to_map.T,
             LOOKS * len(self.places),
             MOST_PLACES if self.places else 0,
-            lambda direction, count: self.is_reached(Vector(to_map.T @ direction), count),
+            lambda direction, count: run(self.is_reached(Vector(to_map.T @ direction), count)),
         )
 
-    def is_reached(self, direction: Vector, count: int) -> bool:
+    def is_reached(self, direction: Vector, count: int) -> Steps[bool]:
         """Whether light from a direction comes to any of so many places, or may do."""
         for _ in range(count):  # a path that meets nothing finds no place
             if len(self.places) >= count:
                 break
             self._follow_another()
+            yield
         if len(self.places) < count:
             return True  # it cannot be told
-        some = np.linspace(0, len(self.places), count, endpoint=False).astype(int)
-        return any(
-            place.normal.dot(direction) > 0 and self.sight.cast(place.point, direction) is None
-            for place in (self.places[k] for k in some)
-        )
+        for k in np.linspace(0, len(self.places), count, endpoint=False).astype(int):
+            place = self.places[k]
+            if place.normal.dot(direction) > 0 and self.sight.cast(place.point, direction) is None:
+                return True
+            yield
+        return False
 
     def _follow_another(self) -> None:
         """A path from the camera, through another point of its picture."""

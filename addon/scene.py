@@ -9,18 +9,33 @@ from typing import Any
 import bpy
 
 from ..core.conversion import Conversion
+from ..core.environment import LUMINANCE_WEIGHTS, EnvironmentMap
 from ..core.errors import UnusableInput
 from ..core.outlines import outlines_of
 from ..core.passes import parts_of, samples_of_passes
+from ..core.progress import Progress, silent
 from ..core.sampling import needs_light_tree
 from ..core.settings import ConversionSettings
-from ..core.visible import visible_part
+from ..core.visible import VisiblePart, visible_part
 from . import passes
+from .driven import followed
+from .images import (
+    READ,
+    Radiance,
+    folder_for_maps,
+    packed_image,
+    read_image,
+    remove_images,
+    write_map,
+)
 from .known import known_conversion
-from .lamps import link_lamps, make_lamps, remove_lamps, unlink_lamps
+from .lamps import link_lamps, make_lamps, name_lamps, remove_lamps, unlink_lamps
 from .light_groups import put_into_groups, remove_groups
 from .rays import Reach
+from .report import headline, made_sentences, skipped_sentences
+from .rig import Rig, make_rig, remove_rig, rig_of
 from .scene_needs import ALL, SceneNeeds, needs_of
+from .steps import Apart, Steps, run_at_once
 from .trace import TAG
 from .world import (
     WorldLight,
@@ -28,13 +43,12 @@ from .world import (
     find_light,
     is_animated,
     name_images,
-    read_image,
     remove_converted,
     unconverted,
 )
 
-LEAST_SAID = 0.0005
-"""Of all light: less of it that reaches nothing is not worth a sentence."""
+MADE = 0.9
+"""Of the time of a conversion, about, until its maps are written."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +74,7 @@ class SceneConversion:
 
     @property
     def headline(self) -> str:
-        count = len(self.conversion.suns)
-        noun = "lamp" if count == 1 else "lamps"
-        return f"{count} {noun} with {self.conversion.account.share:.1%} of all light"
+        return headline(self.conversion)
 
 
 def settings_for(chosen: Mapping[str, Any]) -> ConversionSettings:
@@ -94,49 +106,124 @@ def convert_scene(
     scene: bpy.types.Scene,
     settings: ConversionSettings,
     options: SceneOptions = SceneOptions(),
+    progress: Progress = silent,
 ) -> SceneConversion:
+    """Replace a scene's world and add lamps, all at once: see `conversion_steps`."""
+    return run_at_once(conversion_steps(scene, settings, options), progress)
+
+
+def conversion_steps(
+    scene: bpy.types.Scene, settings: ConversionSettings, options: SceneOptions
+) -> Steps[SceneConversion]:
     """Replace a scene's world and add lamps.
 
     A converted world is converted again as the user has left it, turned or with another map;
     what Restore brings back stays the world that there was first. A world that the user has
     chosen instead becomes the new original. Raises UnusableInput; then, and whatever else goes
-    wrong, the scene is as it was.
+    wrong, and before the last step, the scene is as it was.
     """
-    state, world = scene.sunsplit, scene.world
-    if world is None:
-        raise UnusableInput("The scene has no world: add one with an HDRI first.")
-    again = world == state.converted_world and state.original_world is not None
-    if world.get(TAG) and not again:
-        raise UnusableInput(
-            f'The world "{world.name}" is already converted, by another scene or file: '
-            "restore it there, or choose the original world."
-        )
+    world = _world_to_convert(scene)
     if options.two_passes:
         passes.check(scene)
     light = find_light(world, scene.render.engine)
     found = needs_of(scene) if options.skips or options.two_passes else ALL
     needs = found if options.skips else ALL
-    environment = read_image(light.image)
+    environment = yield from read_image(light.image)
     needed = _without_excess(settings, environment.own_width, needs)
-    visible = None
+    visible = yield from _what_is_visible(scene, environment, needed, needs, light)
+    conversion = yield Apart(
+        lambda listen, _: known_conversion(environment, needed, visible, listen), READ, MADE
+    )
+    with folder_for_maps() as folder:
+        maps = _maps_of(conversion, needs)
+        paths = yield Apart(lambda *_: [write_map(folder, *made) for made in maps.items()], MADE, 1)
+        outlines = yield Apart(lambda *_: outlines_of(conversion).to_text(), 1, 1)
+        images = {path.stem: packed_image(path) for path in paths}
+    result = _replace(scene, light, conversion, images, settings, options, found)
+    scene.sunsplit.outlines = outlines
+    return result
+
+
+def _world_to_convert(scene: bpy.types.Scene) -> bpy.types.World:
+    world = scene.world
+    if world is None:
+        raise UnusableInput("The scene has no world: add one with an HDRI first.")
+    if world.get(TAG) and not _is_converted(scene):
+        raise UnusableInput(
+            f'The world "{world.name}" is already converted, by another scene or file: '
+            "restore it there, or choose the original world."
+        )
+    return world
+
+
+def _is_converted(scene: bpy.types.Scene) -> bool:
+    """Whether the scene shows what its conversion has made."""
+    state = scene.sunsplit
+    return scene.world == state.converted_world and state.original_world is not None
+
+
+def _what_is_visible(
+    scene: bpy.types.Scene,
+    environment: EnvironmentMap,
+    settings: ConversionSettings,
+    needs: SceneNeeds,
+    light: WorldLight,
+) -> Steps[VisiblePart | None]:
     # EEVEE's world shines through everything: there, what is left in it would do harm.
-    if needs.sight and needed.chooses_border and scene.render.engine == "CYCLES":
-        visible = visible_part(environment, Reach.of(needs.sight).looks(light.map_from_world))
-    conversion = known_conversion(environment, needed, visible)
-    original = state.original_world if again else world
+    if not (needs.sight and settings.chooses_border and scene.render.engine == "CYCLES"):
+        return None
+    reach = yield from Reach.steps(needs.sight)
+    to_map = light.map_from_world
+    return (
+        yield Apart(
+            lambda _, in_main: visible_part(environment, reach.looks(to_map, in_main)), READ, READ
+        )
+    )
+
+
+def _maps_of(conversion: Conversion, needs: SceneNeeds) -> dict[str, Radiance]:
+    """What the converted world shows instead of the map, by what it is."""
+    maps: dict[str, Radiance] = {}
+    residual = conversion.levelled or conversion.residual
+    if residual is not None:
+        maps["residual"] = residual
+    environment = conversion.environment
+    width = needs.width_for_camera(environment.own_width)
+    if needs.camera_sees_world and width != environment.own_width:
+        maps["camera"] = environment.narrowed(width)
+    return maps
+
+
+def _replace(
+    scene: bpy.types.Scene,
+    light: WorldLight,
+    conversion: Conversion,
+    images: Mapping[str, bpy.types.Image],
+    settings: ConversionSettings,
+    options: SceneOptions,
+    found: SceneNeeds,
+) -> SceneConversion:
+    """The last step: the new world and lamps are made first, so that nothing is lost if that
+    fails; then they take the place of what was there."""
+    state, world = scene.sunsplit, scene.world
+    needs = found if options.skips else ALL
+    original = state.original_world if _is_converted(scene) else world
     tree_off = _is_without_light_tree(scene, conversion, needs)
-    camera_width = needs.width_for_camera(environment.own_width)
+    try:
+        new = converted_world(world, light, conversion, images, needs.camera_sees_world)
+    finally:
+        remove_images(images)
+    light = find_light(new, scene.render.engine)  # the same, in the new world
+    rig = make_rig(light.texture)
+    lamps = make_lamps(conversion.suns, light, rig, new)
     sentences = [
-        *_sentences(conversion),
-        *_skipped(conversion, settings, needs, tree_off),
-        *_warnings(scene, world, original, light),
+        *made_sentences(conversion),
+        *skipped_sentences(conversion, settings, needs, tree_off),
+        *_warnings(scene, (world, original), light, [*rig_of(rig.sky), *lamps]),
     ]
-    new = converted_world(world, light, conversion, needs.camera_sees_world, camera_width)
-    lamps = make_lamps(conversion.suns, light, new)
-    # From here on `light` must not be used: its nodes go with the world that is replaced.
     restore_scene(scene)
     name_images(new, conversion.environment.name)
-    result = _install(scene, original, conversion, new, lamps)
+    result = _install(scene, original, conversion, new, rig, lamps)
     if tree_off:
         scene.cycles.use_light_tree, state.light_tree_off = False, True
     if options.two_passes:
@@ -185,40 +272,12 @@ def _add_pass(scene: bpy.types.Scene, conversion: Conversion, other_lights: bool
     return lines
 
 
-def _skipped(
-    conversion: Conversion, settings: ConversionSettings, needs: SceneNeeds, tree_off: bool
-) -> list[str]:
-    """What was left out, and why."""
-    lines = []
-    own, width = conversion.environment.own_width, conversion.settings.residual_width
-    if conversion.invisible_part > LEAST_SAID:
-        lines.append(
-            f"Skipped: {conversion.invisible_part:.1%} of the light reaches nothing that the "
-            "camera shows: no lamps for it, it stays in the world."
-        )
-    if conversion.residual is not None and width not in (settings.residual_width, "own"):
-        why = "the camera is too coarse for more" if needs.mirrors else "nothing mirrors sharply"
-        lines.append(
-            f"Skipped: {why}, so the world that lights is {width} pixels wide instead of {own}."
-        )
-    shown = needs.width_for_camera(own)
-    if not needs.camera_sees_world:
-        lines.append("Skipped: the camera does not see the world, so renders do not load the HDRI.")
-    elif shown != own:
-        lines.append(
-            f"Skipped: at this resolution the camera shows no more than {shown} pixels around, so "
-            f"it gets a map that wide instead of {own}."
-        )
-    if tree_off:
-        lines.append("Skipped: the light tree, as the lamps are cheaper without and alone.")
-    return lines
-
-
 def _install(
     scene: bpy.types.Scene,
     original: bpy.types.World,
     conversion: Conversion,
     world: bpy.types.World,
+    rig: Rig,
     lamps: list[bpy.types.Object],
 ) -> SceneConversion:
     """Give a scene its converted world and lamps; the names are free by now."""
@@ -229,8 +288,8 @@ def _install(
     _swap_overrides(scene, original, world)
     for lamp in lamps:
         state.lamps.add().lamp = lamp
-    state.collection = link_lamps(scene, lamps)
-    state.outlines = outlines_of(conversion).to_text()
+    name_lamps(conversion.suns, lamps, rig, conversion.account.source @ LUMINANCE_WEIGHTS)
+    state.sky, state.collection = rig.sky, link_lamps(scene, rig, lamps)
     return SceneConversion(conversion, world, state.collection)
 
 
@@ -243,36 +302,21 @@ def _swap_overrides(
             layer.world_override = new
 
 
-def _sentences(conversion: Conversion) -> list[str]:
-    lines = []
-    if conversion.suns:
-        lines.append(
-            f"By prediction right within {conversion.predicted_error:.2%} under shadows, "
-            f"{conversion.ground_error:.2%} on level ground"
-        )
-    if conversion.residual is not None:
-        error = conversion.account.relative_error.max()
-        lines.append(f"Account: lamps + world = map within {error:.0e}")
-    elif conversion.account.share < 0.999:
-        lines.append(f"{1 - conversion.account.share:.1%} of all light is left out.")
-    if conversion.environment.repairs.pixels:
-        lines.append(f"Repaired pixels: {conversion.environment.repairs}")
-    return [*lines, *conversion.notes]
-
-
 def _warnings(
     scene: bpy.types.Scene,
-    world: bpy.types.World,
-    original: bpy.types.World,
+    worlds: tuple[bpy.types.World, ...],
     light: WorldLight,
+    made: list[bpy.types.Object],
 ) -> list[str]:
+    """What lamps and rig, `made`, cannot follow. worlds: that are replaced."""
     lines = []
-    if is_animated(world, light):
+    if is_animated(light, followed(made)):
         lines.append(
-            f"The world is animated: the lamps stay as they are at frame {scene.frame_current}."
+            "The world is animated by more than a rotation and a strength: in all else the lamps "
+            f"stay as they are at frame {scene.frame_current}."
         )
     for layer in passes.users_layers(scene):
-        if layer.world_override not in (None, world, original):
+        if layer.world_override not in (None, *worlds):
             lines.append(
                 f'View layer "{layer.name}" has a world of its own: '
                 "there, the lamps are added to that world's light."
@@ -297,13 +341,16 @@ def restore_scene(scene: bpy.types.Scene) -> None:
         _swap_overrides(scene, converted, original)
     passes.remove_suns_layer(scene)
     remove_groups(scene.view_layers)
-    state.original_world = state.converted_world = state.collection = None
+    sky = state.sky
+    state.original_world = state.converted_world = state.collection = state.sky = None
     state.lamps.clear()
     state.report = state.outlines = ""
     if state.light_tree_off and hasattr(scene, "cycles"):
         scene.cycles.use_light_tree = True
     state.light_tree_off = False
-    unlink_lamps(scene, collection, lamps)
+    made = [*lamps, *rig_of(sky)]
+    unlink_lamps(scene, collection, made)
+    remove_rig(sky, lamps)
     remove_lamps(lamps)
     if converted is not None and converted != original:
         remove_converted(converted)

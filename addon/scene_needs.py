@@ -12,6 +12,7 @@ import bpy
 
 from ..core.environment import whole_part, whole_part_from
 from .rays import Sight, camera_width, is_all_met, stands_still
+from .rig import rig_of
 
 SHARP = 0.25
 """Roughness below which a surface may show single pixels of a wide map."""
@@ -59,17 +60,17 @@ ALL = SceneNeeds(camera_sees_world=True, mirrors=True, other_lights=True)
 
 def needs_of(scene: bpy.types.Scene) -> SceneNeeds:
     """Look at a scene: its camera, lamps, materials and shapes."""
-    shown = list(_shown(scene.objects))
+    own = {entry.lamp for entry in scene.sunsplit.lamps} | set(rig_of(scene.sunsplit.sky))
+    shown = list(_shown(thing for thing in scene.objects if thing not in own))
     trees = _trees(scene, shown)
     nodes = [node for tree in trees for node in _nodes(tree)]
     if any(tree.animation_data for tree in trees) or any(node.type == "SCRIPT" for node in nodes):
         return ALL
-    own = {entry.lamp for entry in scene.sunsplit.lamps}
     sight = _sight(scene, shown)
     return SceneNeeds(
         camera_sees_world=_sees_world(scene, nodes, sight),
         mirrors=any(_is_sharp(node) for node in nodes),
-        other_lights=any(thing.type == "LIGHT" and thing not in own for thing in shown)
+        other_lights=any(thing.type == "LIGHT" for thing in shown)
         or any(_shines(node) for node in nodes),
         camera_width=camera_width(scene),
         sight=sight if sight and _is_told_by_rays(scene, shown, nodes) else None,

@@ -57,10 +57,15 @@ class Output:
 
 @dataclass(frozen=True, eq=False)
 class Contribution:
-    """An environment texture and the factor, (3,), that its radiance reaches the scene with."""
+    """An environment texture and the factor, (3,), that its radiance reaches the scene with.
+
+    strength: of the one background that it shines through, as a part of that factor; None where
+    there are several.
+    """
 
     texture: Place
     gain: NDArray[np.float64]
+    strength: Input | None = None
 
 
 def cannot_follow(node: bpy.types.Node, why: str) -> UnusableInput:
@@ -91,7 +96,9 @@ def lighting_textures(world: bpy.types.World, engine: str = "CYCLES") -> list[Co
             continue
         key = (*(n.name for n in part.texture.stack), part.texture.node.name)
         before = found.get(key)
-        found[key] = replace(part, gain=part.gain + before.gain) if before else part
+        if before:
+            part = replace(part, gain=part.gain + before.gain, strength=None)
+        found[key] = part
     return list(found.values())
 
 
@@ -154,7 +161,7 @@ def _shader(at: Input) -> Iterator[Contribution]:
     if kind in ("BACKGROUND", "EMISSION"):
         strength = constant(place.input("Strength"))
         for part in _colour(place.input("Color")):
-            yield replace(part, gain=part.gain * strength)
+            yield Contribution(part.texture, part.gain * strength, place.input("Strength"))
     elif kind == "MIX_SHADER":
         factor = float(np.clip(constant(place.input(0))[0], 0, 1))
         for index, weight in ((1, 1 - factor), (2, factor)):

@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-import tempfile
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.conversion import Conversion
-from ..core.environment import EnvironmentMap, environment_from_strips
-from ..core.errors import CannotWrite, UnusableInput
-from ..core.pixels import HeldPixels
-from ..core.residual import LevelledPixels
+from ..core.errors import UnusableInput
 from ..core.sampling import WorldSampling, choose_sampling
-from .known import known_map
 from .light_groups import take_out_of_groups
-from .mapping import map_from_world
-from .trace import TAG, Place, lighting_textures
+from .mapping import map_from_world, turns
+from .trace import TAG, Input, Place, lighting_textures
 
-UNCOMPRESSED = 1024
-"""Pixels of a map's width up to which it is packed as it is: 6 MB at most."""
-
-LINEAR_SPACES = ("Linear ", "Non-Color", "ACEScg", "ACES2065-1", "scene_linear")
-"""How the names of colour spaces begin in which numbers are light."""
+TURNS = "sunsplit_turns"
+"""Custom property of nodes that a conversion has added for the map to be turned by: these stay
+when it is converted again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +26,14 @@ class WorldLight:
     """The environment texture that lights a world.
 
     gain: factor (3,) from the map's radiance to the scene's, strength and tints together.
-    map_from_world: rotation (3, 3), see `mapping.map_from_world`.
+    map_from_world: rotation (3, 3), see `mapping.map_from_world`. strength: the input of the
+    world that is a factor in `gain`, where there is one.
     """
 
     texture: Place
     gain: NDArray[np.float64]
     map_from_world: NDArray[np.float64]
+    strength: Input | None
 
     @property
     def image(self) -> bpy.types.Image:
@@ -56,7 +51,7 @@ def find_light(world: bpy.types.World, engine: str = "CYCLES") -> WorldLight:
     if len(found) > 1:
         names = " and ".join(f'"{part.texture.node.name}"' for part in found)
         raise UnusableInput(f"Several environment textures light the world ({names}): keep one.")
-    texture, gain = found[0].texture, found[0].gain
+    texture, gain, strength = found[0].texture, found[0].gain, found[0].strength
     node = texture.node
     if (gain < 0).any():
         raise UnusableInput("The world's strength is negative: there is no such light.")
@@ -66,97 +61,26 @@ def find_light(world: bpy.types.World, engine: str = "CYCLES") -> WorldLight:
         raise UnusableInput(
             f'The environment texture "{node.name}" is a mirror ball: use an equirectangular map.'
         )
-    return WorldLight(texture, gain, map_from_world(texture))
-
-
-def read_image(image: bpy.types.Image) -> EnvironmentMap:
-    """What a renderer sees of an image, whether it is a file, packed or generated.
-
-    Raises UnusableInput.
-    """
-    if image.source in ("SEQUENCE", "MOVIE", "TILED"):
-        raise UnusableInput(f'"{image.name}" is a {image.source.lower()}: use a single image.')
-    if image.type == "MULTILAYER":
-        raise UnusableInput(
-            f'"{image.name}" is a multilayer EXR: save its combined pass as a plain EXR first.'
-        )
-    width, height = image.size
-    if not image.has_data and not width * height:
-        raise UnusableInput(
-            f'The image "{image.name}" cannot be loaded from {image.filepath or "anywhere"}: '
-            "find the missing file first (File > External Data)."
-        )
-    if not image.is_float:
-        raise UnusableInput(
-            f'"{image.name}" is an LDR image without linear light: use the HDR version of the map.'
-        )
-    space = image.colorspace_settings.name
-    if not space.startswith(LINEAR_SPACES):
-        raise UnusableInput(
-            f'"{image.name}" is read as {space}, in which numbers are not light: '
-            "set its colour space to Linear Rec.709 (or what the file was made in)."
-        )
-    pixels = np.empty(width * height * image.channels, np.float32)
-    image.pixels.foreach_get(pixels)
-    return known_map(pixels, image.name, lambda: _environment(image, pixels))
-
-
-def _environment(image: bpy.types.Image, pixels: NDArray[np.float32]) -> EnvironmentMap:
-    width, height = image.size
-    pixels = pixels.reshape(height, width, image.channels)[::-1]
-    colour = pixels[..., :3] if image.channels >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
-    return environment_from_strips(HeldPixels.of(colour), Path(image.name).stem, image.name)
-
-
-def packed_image(radiance: NDArray[np.float32] | LevelledPixels, kind: str) -> bpy.types.Image:
-    """A map as an image that travels inside the .blend file. Raises CannotWrite.
-
-    kind: what it is; with the map's name it becomes the image's, see `name_images`.
-    """
-    from ..core.files import exr
-
-    try:
-        with tempfile.TemporaryDirectory(prefix="sunsplit-") as folder:
-            path = Path(folder) / "map.exr"
-            if isinstance(radiance, LevelledPixels):
-                half = exr.halved(radiance.residual) is not None
-                exr.write_strips(path, radiance, half)
-            else:  # small maps are written often, and as fast as may be
-                exr.write(path, radiance, compressed=radiance.shape[1] > UNCOMPRESSED)
-            image = bpy.data.images.load(str(path))
-            # Our own writer and Blender's packing keep the values; Image.save() would encode them.
-            image.pack()
-    except OSError as error:
-        raise CannotWrite(
-            f"Cannot write the {kind} map into a temporary folder: {error.strerror}."
-        ) from error
-    image.filepath_raw = ""
-    image.colorspace_settings.name = _working_space()
-    image[TAG] = kind
-    return image
-
-
-def _working_space() -> str:
-    """What `Image.pixels` are in: scene linear, which Blender 5 lets the user choose."""
-    settings = getattr(bpy.data, "colorspace", None)
-    return settings.working_space if settings else "Linear Rec.709"
+    return WorldLight(texture, gain, map_from_world(texture), strength)
 
 
 def converted_world(
     world: bpy.types.World,
     light: WorldLight,
     conversion: Conversion,
+    images: Mapping[str, bpy.types.Image],
     camera_sees_it: bool = True,
-    camera_width: int | None = None,
 ) -> bpy.types.World:
     """A copy of a world in which all rays but the camera's see the residual (or black), or all
     rays where the camera does not see it: then Cycles does not load the map.
 
     world: what `light` was found in; when it is a converted one, the copy loses what that
-    conversion has put in. camera_width: of the map that the camera sees, None for the map's own.
+    conversion has put in. images: "residual"; "camera", a narrower map that the camera sees.
     Nothing is left behind when this fails.
     """
     new = world.copy()
+    if new.override_library:  # of which no new node would be saved
+        new = new.make_local(clear_liboverride=True)
     new[TAG] = True
     take_out_of_groups(new)
     try:
@@ -168,17 +92,16 @@ def converted_world(
             tree = group.node_tree
         _strip(tree)
         texture = tree.nodes[light.texture.node.name]
-        residual = conversion.levelled or conversion.residual
-        image = packed_image(residual, "residual") if residual is not None else None
+        if not any(turn.rotation for turn in turns(light.texture)):
+            _insert_rotation(tree, texture)
         # Between cells nothing is to be blended: a Voronoi map has edges.
         closest = conversion.settings.residual == "voronoi"
         interpolation = "Closest" if closest else texture.interpolation
-        mix = _insert(tree, texture, image, interpolation, -300)
+        mix = _insert(tree, texture, images.get("residual"), interpolation, -300)
         if camera_sees_it:
             _show_camera(mix)
-        if camera_sees_it and camera_width not in (None, conversion.environment.own_width):
-            narrow = packed_image(conversion.environment.narrowed(camera_width), "camera")
-            _insert(tree, texture, narrow, texture.interpolation, 300)
+        if "camera" in images:
+            _insert(tree, texture, images["camera"], texture.interpolation, 300)
         _set_sampling(new, _sampling(conversion, closest))
     except BaseException:  # whatever it is, it goes on; only the half-made copy goes away
         remove_converted(new)
@@ -198,6 +121,25 @@ def black_world() -> bpy.types.World:
     return world
 
 
+def _insert_rotation(tree: bpy.types.NodeTree, texture: bpy.types.Node) -> None:
+    """Put a Mapping before an environment texture that has none, so that the map can be turned."""
+    mapping = tree.nodes.new("ShaderNodeMapping")
+    mapping.name = mapping.label = "Sunsplit: Rotation"
+    mapping[TURNS] = True
+    mapping.vector_type = "POINT"
+    mapping.location = texture.location.x - 200, texture.location.y
+    vector = texture.inputs["Vector"]
+    if vector.is_linked:
+        source = vector.links[0].from_socket
+    else:
+        coordinates = tree.nodes.new("ShaderNodeTexCoord")
+        coordinates[TURNS] = True
+        coordinates.location = texture.location.x - 400, texture.location.y
+        source = coordinates.outputs["Generated"]
+    tree.links.new(source, mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], vector)
+
+
 def _strip(tree: bpy.types.NodeTree) -> None:
     """Take out the nodes that a conversion has put into a tree."""
     for mix in [node for node in tree.nodes if node.get(TAG) and node.type == "MIX"]:
@@ -206,6 +148,18 @@ def _strip(tree: bpy.types.NodeTree) -> None:
             tree.links.new(source, socket)
     for node in [node for node in tree.nodes if node.get(TAG)]:
         tree.nodes.remove(node)
+
+
+def _strip_rotation(tree: bpy.types.NodeTree) -> None:
+    """Take out the Mapping that a conversion has added, if it turns nothing by now."""
+    for mapping in [n for n in tree.nodes if n.get(TURNS) and n.type == "MAPPING"]:
+        vector, rotation = mapping.inputs["Vector"], mapping.inputs["Rotation"]
+        if rotation.is_linked or any(rotation.default_value) or not vector.is_linked:
+            continue
+        source = vector.links[0].from_socket
+        for socket in [link.to_socket for link in mapping.outputs[0].links]:
+            tree.links.new(source, socket)
+        tree.nodes.remove(mapping)
 
 
 def _insert(
@@ -282,11 +236,33 @@ def _set_sampling(world: bpy.types.World, sampling: WorldSampling) -> None:
         world.cycles.sample_map_resolution = sampling.resolution
 
 
-def is_animated(world: bpy.types.World, light: WorldLight) -> bool:
-    """Whether keyframes or drivers may change what was read from the world's nodes."""
-    trees = [world.node_tree, *(outer.node_tree for outer in light.texture.stack)]
-    data = [thing.animation_data for thing in (world, *trees) if thing.animation_data]
-    return any(one.action or len(one.drivers) for one in data)
+def is_animated(light: WorldLight, followed: Container[tuple[bpy.types.ID, str]]) -> bool:
+    """Whether keyframes or drivers may change what was read from the world's nodes, but for inputs
+    that are followed: see `driven.followed`."""
+    tree = light.texture.node.id_data
+    trees = {tree, *(outer.id_data for outer in light.texture.stack)}
+    worlds = {world for world in bpy.data.worlds if world.node_tree in trees}
+    return any(
+        path is None or (thing, path) not in followed
+        for thing in (*trees, *worlds)
+        for path in _animated_paths(thing)
+    )
+
+
+def _animated_paths(thing: bpy.types.ID) -> Iterator[str | None]:
+    """Of a data-block's properties that change by themselves; None: some, it cannot be told
+    which."""
+    made = thing.animation_data
+    if made is None:
+        return
+    yield from (curve.data_path for curve in made.drivers)
+    if len(made.nla_tracks):
+        yield None
+    if made.action:
+        for layer in made.action.layers:
+            for strip in layer.strips:
+                bag = strip.channelbag(made.action_slot)
+                yield from (curve.data_path for curve in bag.fcurves) if bag else ()
 
 
 def remove_converted(world: bpy.types.World) -> None:
@@ -331,6 +307,7 @@ def unconverted(world: bpy.types.World) -> bpy.types.World:
     trees = [world.node_tree]
     for tree in trees:
         _strip(tree)
+        _strip_rotation(tree)
         trees += [n.node_tree for n in tree.nodes if n.type == "GROUP" and n.node_tree]
     take_out_of_groups(world)
     del world[TAG]

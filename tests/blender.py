@@ -81,7 +81,7 @@ def add_mapping(texture: bpy.types.Node) -> bpy.types.Node:
 
 def suns(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The lamps of a conversion, in their order."""
-    return list(scene.sunsplit.collection.objects)
+    return [thing for thing in scene.sunsplit.collection.objects if thing.type == "LIGHT"]
 
 
 def to_light(lamp: bpy.types.Object) -> np.ndarray:

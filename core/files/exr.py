@@ -61,14 +61,24 @@ def read(path: Path) -> tuple[Pixels, list[str]]:
     return HeldPixels(planes), [*warnings, *remarks]
 
 
+def is_plain(path: Path) -> bool:
+    """Whether a file is one picture, all of it, so that all programs read the same of it. Raises
+    UnusableInput where the file is damaged."""
+    headers = _read_headers(path)
+    named = any("." in channel.name for channel in headers[0]["channels"])
+    return len(headers) == 1 and not named and not _is_cropped(headers[0])
+
+
+def _is_cropped(header: Header) -> bool:
+    window = _window(header, "dataWindow")
+    return "envmap" not in header and not np.array_equal(window, _window(header, "displayWindow"))
+
+
 def _strips(path: Path, layer: Layer, header: Header) -> ExrPixels | None:
     """Pixels that lie where the picture does."""
-    window = _window(header, "dataWindow")
-    cropped = "envmap" not in header and not np.array_equal(
-        window, _window(header, "displayWindow")
-    )
-    if cropped:
+    if _is_cropped(header):
         return None
+    window = _window(header, "dataWindow")
     return ExrPixels.of(path, layer.channels, _size(window), int(window[0][1]))
 
 

@@ -87,8 +87,9 @@ def test_lamps_lie_in_their_collection_and_are_set_up_whole(scene, two_suns):
     bpy.ops.sunsplit.convert()
     collection = bpy.data.collections["Sunsplit Suns"]
     assert collection.name in scene.collection.children
-    assert [lamp.name for lamp in collection.objects] == ["Sunsplit Sun 1", "Sunsplit Sun 2"]
-    for lamp in collection.objects:
+    assert [lamp.name for lamp in suns(scene)] == ["Sun 1 (34 %)", "Sun 2 (17 %)"]
+    assert all(lamp.data.name == lamp.name for lamp in suns(scene))
+    for lamp in suns(scene):
         assert lamp.data.type == "SUN"
         assert not lamp.visible_camera
         assert lamp.visible_glossy

@@ -46,7 +46,7 @@ def test_a_world_that_is_turned_is_not_converted_anew(scene, monkeypatch):
 
 def test_other_settings_are_another_conversion_of_the_same_map(scene, monkeypatch):
     bpy.ops.sunsplit.convert(lights=1)
-    monkeypatch.setattr("sunsplit.addon.world.environment_from_strips", None)  # would raise
+    monkeypatch.setattr("sunsplit.addon.images.load", None)  # would raise
     bpy.ops.sunsplit.convert(lights=4, share=0.9)
     assert len(suns(scene)) > 1
 
@@ -78,7 +78,8 @@ def test_exchanged_rows_are_another_map():
         assert known._fingerprint(other) != known._fingerprint(numbers)
 
 
-def test_what_is_too_large_is_not_kept(scene, monkeypatch):
+def test_what_is_too_large_in_memory_is_not_kept(scene, monkeypatch):
+    bpy.data.images["map.exr"].pack()
     bpy.ops.sunsplit.convert(lights=1)
     assert known._last
     monkeypatch.setattr(known, "MOST_BYTES", 1000)

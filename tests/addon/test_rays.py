@@ -9,6 +9,7 @@ from mathutils import Matrix
 
 from sunsplit.addon.rays import Reach, camera_width
 from sunsplit.addon.scene_needs import needs_of
+from sunsplit.addon.steps import run_at_once
 from tests.blender import (
     add_mesh,
     camera_towards,
@@ -170,7 +171,7 @@ def test_through_a_window_only_what_is_in_front_of_it(two_suns):
 
 
 def test_the_same_scene_is_seen_the_same_way_twice(scene):
-    first, second = (Reach.of(needs_of(scene).sight) for _ in range(2))
+    first, second = (run_at_once(Reach.steps(needs_of(scene).sight)) for _ in range(2))
     assert first.escaped == second.escaped
 
 

@@ -9,6 +9,7 @@ from mathutils import Matrix
 
 from sunsplit.addon.rays import PLACES, Reach
 from sunsplit.addon.scene_needs import ALL, LIGHTING_WIDTH, SceneNeeds, needs_of
+from sunsplit.addon.steps import run_at_once
 from tests.blender import (
     add_mesh,
     box_mesh,
@@ -43,7 +44,7 @@ def sees_world(scene) -> bool:
 def test_in_a_box_nothing_is_needed(scene):
     needs = needs_of(scene)
     assert not any((needs.camera_sees_world, needs.mirrors, needs.other_lights))
-    reach = Reach.of(needs.sight)
+    reach = run_at_once(Reach.steps(needs.sight))
     assert len(reach.places) >= PLACES
     assert not reach.escaped
 

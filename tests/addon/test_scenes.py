@@ -136,14 +136,15 @@ def test_lamps_do_to_each_kind_of_ray_what_the_world_does(scene, east):
     assert lamp.lightgroup == "Sky"
 
 
-def test_an_animated_world_is_named(scene, east):
+@pytest.mark.parametrize("name", ["Rotation", "Scale"])
+def test_an_animation_that_lamps_do_not_follow_is_named(scene, east, name):
     mapping = add_mapping(hdri_world(scene, east))
     bpy.ops.sunsplit.convert()
     assert "animated" not in scene.sunsplit.report
     bpy.ops.sunsplit.restore()
-    mapping.inputs["Rotation"].keyframe_insert("default_value", frame=1)
+    mapping.inputs[name].keyframe_insert("default_value", frame=1)
     bpy.ops.sunsplit.convert()
-    assert "animated" in scene.sunsplit.report
+    assert ("animated" in scene.sunsplit.report) == (name == "Scale")
 
 
 def test_a_share_given_as_an_argument_counts(scene, east):
@@ -209,7 +210,7 @@ def test_a_temporary_folder_that_cannot_be_written_changes_nothing(scene, east, 
     kept = tempfile.tempdir
     tempfile.tempdir = "/proc/nowhere"
     try:
-        with pytest.raises(RuntimeError, match="Cannot write the residual map"):
+        with pytest.raises(RuntimeError, match="Cannot make a temporary folder"):
             bpy.ops.sunsplit.convert()
     finally:
         tempfile.tempdir = kept

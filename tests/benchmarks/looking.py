@@ -22,10 +22,12 @@ import numpy as np
 from mathutils import Matrix
 
 from sunsplit.addon import known
+from sunsplit.addon.images import read_image
 from sunsplit.addon.rays import Reach
 from sunsplit.addon.scene import SceneOptions, convert_scene, restore_scene
 from sunsplit.addon.scene_needs import needs_of
-from sunsplit.addon.world import WorldLight, find_light, read_image
+from sunsplit.addon.steps import run_at_once
+from sunsplit.addon.world import WorldLight, find_light
 from sunsplit.core.environment import EnvironmentMap
 from sunsplit.core.settings import ConversionSettings
 from sunsplit.core.visible import visible_part
@@ -62,7 +64,7 @@ def looks(path: Path, options: argparse.Namespace) -> list[Result]:
 
 
 def _reach(scene: bpy.types.Scene) -> Reach:
-    return Reach.of(needs_of(scene).sight)
+    return run_at_once(Reach.steps(needs_of(scene).sight))
 
 
 def _with_hills(path: Path, side: int) -> bpy.types.Scene:
@@ -103,7 +105,7 @@ def overhead(path: Path, options: argparse.Namespace) -> tuple[float, float]:
         raise AssertionError(scene.sunsplit.report)
     restore_scene(scene)
     light = find_light(scene.world)
-    environment = read_image(light.image)
+    environment = run_at_once(read_image(light.image))
     looked, made = [], []
     with tempfile.TemporaryDirectory() as name:
         for _ in range(2 * options.repeats):
@@ -119,7 +121,7 @@ def overhead(path: Path, options: argparse.Namespace) -> tuple[float, float]:
 
 def _look(scene: bpy.types.Scene, environment: EnvironmentMap, light: WorldLight) -> None:
     """All that is done to know what may be skipped."""
-    visible_part(environment, _reach(scene).looks(light.map_from_world))
+    visible_part(environment, _reach(scene).looks(light.map_from_world, run_at_once))
 
 
 def changes(path: Path, options: argparse.Namespace) -> list[Result]:

@@ -20,8 +20,10 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from sunsplit.addon.images import read_image
 from sunsplit.addon.scene import SceneOptions, convert_scene
-from sunsplit.addon.world import find_light, read_image
+from sunsplit.addon.steps import run_at_once
+from sunsplit.addon.world import find_light
 from sunsplit.core.environment import luminance
 from sunsplit.core.noise import borders
 from sunsplit.core.sampling import contrast
@@ -144,7 +146,7 @@ def set_up(scene: bpy.types.Scene, row: Row) -> tuple[int, float, float, float]:
 
 def share_above(scene: bpy.types.Scene, times: float) -> float:
     """Of all light, what lies above so many times the border that the program would choose."""
-    found = read_image(find_light(scene.world).image)
+    found = run_at_once(read_image(find_light(scene.world).image))
     lum = luminance(found.radiance)
     best = borders(lum, row_solid_angles(found.width, found.height)).best_level
     return stratify_at(lum, times * best, 2).share

@@ -13,7 +13,9 @@ import contextlib
 import importlib
 import io
 import json
+import os
 import sys
+from functools import partial
 from pathlib import Path
 
 PACKAGES, ZIP, HDRI, FOLDER = sys.argv[1:5]
@@ -28,11 +30,14 @@ LIBRARIES = ("scipy", "skimage", "OpenEXR", "OpenImageIO", "PIL", "tqdm", "netwo
 def main() -> None:
     """Install, use, disable and enable again; then the command line of the same installation."""
     report = {"install": install()}
+    report["touched"] = touched = []
+    sys.addaudithook(partial(watch, Path(sys.modules[MODULE].__file__).parent, touched))
     light_by(HDRI)
     report["before"] = seen()
     report["convert"] = pressed(bpy.ops.sunsplit.convert)
-    report["libraries_to_convert"] = loaded()
     report["restore"] = pressed(bpy.ops.sunsplit.restore)
+    report["without_openimageio"] = without("OpenImageIO")
+    bpy.ops.sunsplit.restore()
     bpy.ops.preferences.addon_disable(module=MODULE)
     report["disabled"] = present()
     bpy.ops.preferences.addon_enable(module=MODULE)
@@ -60,6 +65,24 @@ def install() -> dict[str, object]:
         "loaded_before": sorted(before & set(LIBRARIES)),
         "present": present(),
     }
+
+
+def watch(home: Path, touched: list[str], event: str, arguments: tuple) -> None:
+    """Note what would not work in a folder that may only be read, or without a network: writing
+    into the extension's own folder, but for compiled Python, and connecting to anything."""
+    paths = [Path(a) for a in arguments if isinstance(a, str)]
+    inside = any(p.is_relative_to(home) and "__pycache__" not in p.parts for p in paths[:2])
+    if event == "open":
+        _, mode, flags = arguments
+        read = flags or 0 if mode is None else os.O_RDONLY if mode[0] == "r" else os.O_WRONLY
+        writes = read & (os.O_WRONLY | os.O_RDWR | os.O_CREAT) or "+" in (mode or "")
+        if inside and writes:
+            touched.append(f"{event} {arguments}")
+    elif event.startswith(("os.mkdir", "os.rename", "os.remove", "shutil.", "tempfile.")):
+        if inside:
+            touched.append(f"{event} {arguments}")
+    elif event in ("socket.connect", "socket.getaddrinfo", "urllib.Request"):
+        touched.append(f"{event} {arguments}")
 
 
 def present() -> dict[str, bool]:
@@ -93,10 +116,23 @@ def pressed(operator: object) -> dict[str, object]:
     return {"result": list(operator()), **seen()}
 
 
+def without(library: str) -> dict[str, object]:
+    """Convert where a library cannot be imported, a map that is not known already."""
+    kept = sys.modules.pop(library, None)
+    sys.modules[library] = None
+    sys.modules[f"{MODULE}.addon.known"].forget()
+    try:
+        return pressed(bpy.ops.sunsplit.convert)
+    finally:
+        del sys.modules[library]
+        if kept is not None:
+            sys.modules[library] = kept
+
+
 def seen() -> dict[str, object]:
     """The scene's world and the lamps of a conversion."""
     collection = bpy.data.collections.get("Sunsplit Suns")
-    lamps = list(collection.objects) if collection else []
+    lamps = [t for t in collection.objects if t.type == "LIGHT"] if collection else []
     maps = [n for n in bpy.context.scene.world.node_tree.nodes if n.type == "TEX_ENVIRONMENT"]
     return {
         "world": bpy.context.scene.world.name,

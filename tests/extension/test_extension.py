@@ -222,6 +222,11 @@ def test_enabling_imports_no_library(session: dict):
     assert not heavy & set(session["install"]["imported"])
 
 
+def test_needs_neither_its_own_folder_nor_a_network(session: dict):
+    """So it works where extensions may only be read; it is never online."""
+    assert session["touched"] == []
+
+
 def test_converts_a_world(session: dict):
     before, after = session["before"], session["convert"]
     assert after["result"] == ["FINISHED"], session["log"]
@@ -249,7 +254,7 @@ def test_enabled_again_converts_the_same(session: dict):
 
 def test_converting_in_blender_does_without_openimageio(session: dict):
     """The zip for windows-arm64 has no OpenImageIO."""
-    assert "OpenImageIO" not in session["libraries_to_convert"]
+    assert session["without_openimageio"] == session["convert"]
 
 
 def test_command_line_of_the_extension_converts_a_file(session: dict):

@@ -1,0 +1,78 @@
+"""What a conversion has done, in sentences for the panel: whole ones, which can be translated."""
+
+from __future__ import annotations
+
+from bpy.app.translations import pgettext_rpt as said
+
+from ..core.conversion import Conversion
+from ..core.settings import ConversionSettings
+from .scene_needs import SceneNeeds
+
+LEAST_SAID = 0.0005
+"""Of all light: less of it that reaches nothing is not worth a sentence."""
+
+
+def headline(conversion: Conversion) -> str:
+    count, share = len(conversion.suns), conversion.account.share
+    if count == 1:
+        return said("1 lamp with {share:.1%} of all light").format(share=share)
+    return said("{count} lamps with {share:.1%} of all light").format(count=count, share=share)
+
+
+def made_sentences(conversion: Conversion) -> list[str]:
+    """How true it is, and what the user should know of it."""
+    lines = []
+    if conversion.suns:
+        text = said(
+            "By prediction right within {edges:.2%} under shadows, {ground:.2%} on level ground"
+        )
+        edges, ground = conversion.predicted_error, conversion.ground_error
+        lines.append(text.format(edges=edges, ground=ground))
+    if conversion.residual is not None:
+        error = conversion.account.relative_error.max()
+        lines.append(said("Account: lamps + world = map within {error:.0e}").format(error=error))
+    elif conversion.account.share < 0.999:
+        left = 1 - conversion.account.share
+        lines.append(said("{left:.1%} of all light is left out.").format(left=left))
+    if conversion.environment.repairs.pixels:
+        repairs = conversion.environment.repairs
+        lines.append(said("Repaired pixels: {repairs}").format(repairs=repairs))
+    return [*lines, *conversion.notes]
+
+
+def skipped_sentences(
+    conversion: Conversion, settings: ConversionSettings, needs: SceneNeeds, tree_off: bool
+) -> list[str]:
+    """What was left out, and why. settings: as the user has them."""
+    lines = []
+    own, width = conversion.environment.own_width, conversion.settings.residual_width
+    if conversion.invisible_part > LEAST_SAID:
+        text = said(
+            "Skipped: {part:.1%} of the light reaches nothing that the camera shows: no lamps for "
+            "it, it stays in the world."
+        )
+        lines.append(text.format(part=conversion.invisible_part))
+    if conversion.residual is not None and width not in (settings.residual_width, "own"):
+        coarse = said(
+            "Skipped: the camera is too coarse for more, so the world that lights is {width} "
+            "pixels wide instead of {own}."
+        )
+        rough = said(
+            "Skipped: nothing mirrors sharply, so the world that lights is {width} pixels wide "
+            "instead of {own}."
+        )
+        lines.append((coarse if needs.mirrors else rough).format(width=width, own=own))
+    shown = needs.width_for_camera(own)
+    if not needs.camera_sees_world:
+        lines.append(
+            said("Skipped: the camera does not see the world, so renders do not load the HDRI.")
+        )
+    elif shown != own:
+        text = said(
+            "Skipped: at this resolution the camera shows no more than {shown} pixels around, so "
+            "it gets a map that wide instead of {own}."
+        )
+        lines.append(text.format(shown=shown, own=own))
+    if tree_off:
+        lines.append(said("Skipped: the light tree, as the lamps are cheaper without and alone."))
+    return lines
