@@ -16,7 +16,7 @@ from sunsplit.addon.overlay_draw import Kept
 from sunsplit.addon.overlay_image import border_layers, light_shown
 from sunsplit.addon.overlay_suns import lit_place, on_screen, shown_suns
 from sunsplit.addon.pick import select, selects
-from sunsplit.core import ConversionSettings, convert, load
+from sunsplit.core import ConversionSettings, convert, load, sphere
 from sunsplit.core.outlines import Outlines, outlines_of
 from tests.blender import add_mapping, fresh_scene, hdri_world, plate_mesh, write_map
 from tests.maps import direction, paint_disc, sky
@@ -176,6 +176,25 @@ def test_over_a_turned_map_suns_are_where_its_pixels_are(scene, three_suns):
     found = shown.to_light @ light.map_from_world.T
     expected = [sun.to_light for sun in convert(load(three_suns), LIKE_THREE).suns]
     assert found == pytest.approx(np.array(expected), abs=1e-5)
+
+
+def test_turning_the_world_turns_the_suns_and_not_the_map(scene, three_suns):
+    mapping = add_mapping(hdri_world(scene, three_suns))
+    bpy.ops.sunsplit.convert(lights=3, skips=False)
+    bpy.context.view_layer.update()
+    image = next(one for one in bpy.data.images if "three suns.exr" in one.name)
+
+    def seen():
+        to_light = shown_suns(bpy.context).to_light
+        return to_light, to_light @ light_shown(scene, image).map_from_world.T
+
+    before, on_map = seen()
+    node = scene.sunsplit.converted_world.node_tree.nodes[mapping.name]
+    node.inputs["Rotation"].default_value[2] = np.radians(70)
+    bpy.context.view_layer.update()
+    after, still_on_map = seen()
+    assert np.degrees(sphere.angle_between(before, after))[0] > 30
+    assert still_on_map == pytest.approx(on_map, abs=1e-6)
 
 
 def test_a_world_that_lamps_cannot_follow_shows_none(converted):
