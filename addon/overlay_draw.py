@@ -99,14 +99,14 @@ class Kept:
     def __init__(self) -> None:
         self._drawings: dict[int, tuple[object, Drawing]] = {}
 
-    def draw(self, region: int, key: object, make: Callable[[], Drawing]) -> None:
-        """Draw what `make` gives; it is called where the region's key differs from the last."""
+    def drawing(self, region: int, key: object, make: Callable[[], Drawing]) -> Drawing:
+        """What `make` gives; it is called where the region's key differs from the last."""
         if self._drawings.get(region, (None,))[0] != key:
             self._drawings.pop(region, None)
             while len(self._drawings) >= self.MOST:  # regions that are no more
                 del self._drawings[next(iter(self._drawings))]
             self._drawings[region] = key, make()
-        self._drawings[region][1].draw()
+        return self._drawings[region][1]
 
     def forget(self) -> None:
         self._drawings.clear()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import bpy
 import gpu
 import numpy as np
@@ -30,31 +32,64 @@ _discs: list[tuple[object, MapDiscs]] = []
 
 def draw_image() -> None:
     """Blender calls this for each Image editor that it draws on the screen."""
-    context = bpy.context
-    found = seen_map(context)
+    found = drawings_of(bpy.context)
     if found is None:
         return
-    suns, marks, (origin, size) = found
-    region, scale = context.region.as_pointer(), context.preferences.system.ui_scale
-    text = context.scene.sunsplit.outlines
+    (origin, size), borders, suns = found
     with gpu.matrix.push_pop():
         gpu.matrix.translate((origin[0], origin[1] + size[1]))
         gpu.matrix.scale((size[0], -size[1]))
-        _borders.draw(0, (text, scale), lambda: Drawing(border_layers(text, scale)))
+        borders.draw()
+    suns.draw()
+
+
+def drawings_of(
+    context: bpy.types.Context,
+) -> tuple[tuple[Floats, Floats], Drawing, Drawing] | None:
+    """Where the map is, see `SeenMap`; borders in its u, v, and suns in pixels over it."""
+    seen = seen_map(context)
+    if seen is None:
+        return None
+    scale, suns, text = seen.scale, seen.suns, context.scene.sunsplit.outlines
+    borders = _borders.drawing(0, (text, scale), lambda: Drawing(border_layers(text, scale)))
     halo, frame = halo_of(context, suns), free_frame(context)
 
     def drawing() -> Drawing:
+        marks = seen.marks()
         labels = words(suns, marks, halo, frame, scale, ranks_only=True)
         return Drawing(sun_layers(suns, marks, halo, scale), labels, LETTERS * scale)
 
-    _kept.draw(region, (suns.key, marks.key, frame, halo.tobytes(), scale), drawing)
+    key = suns.key, seen.key, frame, halo.tobytes()
+    region = context.region.as_pointer()
+    return (seen.origin, seen.size), borders, _kept.drawing(region, key, drawing)
 
 
-def seen_map(
-    context: bpy.types.Context,
-) -> tuple[ShownSuns, Marks, tuple[Floats, Floats]] | None:
-    """Suns, where they are in the Image editor of a context, and the rectangle that the map fills:
-    lower left corner and size in pixels. None where it shows something else."""
+@dataclass(frozen=True, eq=False)
+class SeenMap:
+    """Suns over a map in an Image editor.
+
+    to_light: in the map's directions, (n, 3). origin, size: of the rectangle that the map fills,
+    pixels: its lower left corner, width and height. scale: of the interface.
+    """
+
+    suns: ShownSuns
+    to_light: Floats
+    origin: Floats
+    size: Floats
+    scale: float
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """Tells apart what would be drawn differently."""
+        return (*(one.tobytes() for one in (self.to_light, self.origin, self.size)), self.scale)
+
+    def marks(self) -> Marks:
+        discs = _discs_of(self.to_light, self.suns.half_angle)
+        return marks_in_map(discs, self.origin, self.size, RING * self.scale)
+
+
+def seen_map(context: bpy.types.Context) -> SeenMap | None:
+    """What the Image editor of a context shows; None where that is no converted map."""
     space = context.space_data
     image = space.image
     if image is None or space.mode == "UV" or not is_shown(context):
@@ -63,10 +98,9 @@ def seen_map(
     if light is None:
         return None
     suns = shown_suns(context)
-    origin, size = map_on_screen(context.region)
-    discs = _discs_of(suns.to_light @ light.map_from_world.T, suns.half_angle)
-    least = RING * context.preferences.system.ui_scale
-    return suns, marks_in_map(discs, origin, size, least), (origin, size)
+    to_light = suns.to_light @ light.map_from_world.T
+    scale = context.preferences.system.ui_scale
+    return SeenMap(suns, to_light, *map_on_screen(context.region), scale)
 
 
 def light_shown(scene: bpy.types.Scene, image: bpy.types.Image) -> WorldLight | None:

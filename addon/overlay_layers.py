@@ -44,9 +44,9 @@ def sun_layers(suns: ShownSuns, marks: Marks, halo: Floats, scale: float) -> lis
     lines, owner = marks.lines, marks.owner
     chosen = suns.selected[owner]
     layers: list[Lines | Areas] = [
-        Lines(lines[chosen], _both(halo[owner[chosen]]), HALO_WIDTH * scale),
-        Lines(lines, _both(rim[owner]), RIM_WIDTH * scale),
-        Lines(lines, _both(colour[owner]), WIDTH * scale),
+        Lines(lines[chosen], _both(halo, owner[chosen]), HALO_WIDTH * scale),
+        Lines(lines, _both(rim, owner) if marks.behind.any() else RIM, RIM_WIDTH * scale),
+        Lines(lines, _both(colour, owner), WIDTH * scale),
     ]
     inside = np.flatnonzero(~marks.aside)
     for radius, of_suns in ((DOT + 1.25, rim), (DOT, colour)):
@@ -127,9 +127,9 @@ def words(
     ]
 
 
-def _both(colour: Floats) -> Floats:
-    """The same colour for both ends of each piece, (m, 2, 4)."""
-    return colour[:, None].repeat(2, axis=1)
+def _both(colour: Floats, owner: NDArray[np.intp]) -> NDArray[np.float32]:
+    """The colour, (n, 4), of each piece's sun for both of its ends, (m, 2, 4)."""
+    return colour.astype(np.float32)[owner.repeat(2)].reshape(-1, 2, 4)
 
 
 _TURN = np.linspace(0, 2 * np.pi, 13)

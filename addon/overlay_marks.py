@@ -16,6 +16,9 @@ Floats = NDArray[np.float64]
 AROUND = 49
 """Points of a circle, its first twice."""
 
+WIDE = 0.2
+"""Radians; near a pole, or if it is wide, a disc is no circle on the map and takes more points."""
+
 
 @dataclass(frozen=True, eq=False)
 class Marks:
@@ -33,11 +36,6 @@ class Marks:
     narrow: NDArray[np.bool_]
     aside: NDArray[np.bool_]
     behind: NDArray[np.bool_]
-
-    @property
-    def key(self) -> tuple[bytes, ...]:
-        """Tells apart what would be drawn differently."""
-        return self.place.tobytes(), self.lines.tobytes()
 
     def hit(self, x: float, y: float, reach: float) -> int | None:
         """The sun whose centre or outline is nearest, at most `reach` pixels away."""
@@ -112,7 +110,8 @@ def discs_in_map(to_light: Floats, half_angle: Floats) -> MapDiscs:
     u, v = sphere.to_image(to_light)
     pieces, owner = [np.empty((0, 2, 2))], [np.empty(0, np.intp)]
     for number, (centre, angle) in enumerate(zip(to_light, half_angle, strict=True)):
-        for line in lines_in_image(sphere.circle(centre, angle, 2 * AROUND)):
+        plain = angle < WIDE and np.hypot(centre[0], centre[1]) > 2 * WIDE
+        for line in lines_in_image(sphere.circle(centre, angle, AROUND if plain else 3 * AROUND)):
             pieces.append(np.stack([line[:-1], line[1:]], axis=1))
             owner.append(np.full(len(line) - 1, number))
     place = np.stack([u, v], axis=-1)
@@ -142,7 +141,7 @@ def marks_in_map(discs: MapDiscs, origin: Floats, size: Floats, least: float) ->
 
 def on_map(uv: Floats, origin: Floats, size: Floats) -> Floats:
     """Pixels of places u, v (v downwards) on a map, (..., 2)."""
-    return origin + (uv * (1, -1) + (0, 1)) * size
+    return uv * np.array([size[0], -size[1]]) + np.array([origin[0], origin[1] + size[1]])
 
 
 def _marks_on_globe(to_light: Floats, rims: Floats, view: View, least: float) -> Marks:

@@ -20,17 +20,23 @@ _rims: list[tuple[object, Floats]] = []
 
 def draw_view() -> None:
     """Blender calls this for each 3D view that it draws on the screen; renders have no overlay."""
-    context = bpy.context
+    drawing = drawing_of(bpy.context)
+    if drawing is not None:
+        drawing.draw()
+
+
+def drawing_of(context: bpy.types.Context) -> Drawing | None:
+    """What the 3D view of a context has over it."""
     if not is_shown(context):
-        return
+        return None
     suns = shown_suns(context)
     if not len(suns):
-        return
+        return None
     view, pivot = view_of(context), lit_place(context, suns)
     halo, scale = halo_of(context, suns), context.preferences.system.ui_scale
     key = (suns.key, view.matrix.tobytes(), view.frame, pivot.tobytes(), halo.tobytes(), scale)
     region = context.region.as_pointer()
-    _kept.draw(region, key, lambda: _drawing(suns, view, pivot, halo, scale))
+    return _kept.drawing(region, key, lambda: _drawing(suns, view, pivot, halo, scale))
 
 
 def is_shown(context: bpy.types.Context) -> bool:

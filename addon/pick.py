@@ -63,8 +63,8 @@ def suns_on_screen(context: bpy.types.Context) -> tuple[ShownSuns, Marks] | None
     if context.space_data.type == "IMAGE_EDITOR":
         from .overlay_image import seen_map
 
-        found = seen_map(context)
-        return found and found[:2]
+        seen = seen_map(context)
+        return (seen.suns, seen.marks()) if seen else None
     from .overlay_view import seen_suns
 
     return seen_suns(context)

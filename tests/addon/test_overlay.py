@@ -236,7 +236,7 @@ def test_a_drawing_is_made_again_only_after_a_change():
             made.append(key)
             return SimpleNamespace(draw=lambda: drawn.append(key))
 
-        kept.draw(region, key, make)
+        kept.drawing(region, key, make).draw()
 
     for region, key in ((1, "a"), (1, "a"), (2, "b"), (1, "a"), (1, "c")):
         draw(region, key)

@@ -330,6 +330,29 @@ def viewport_render(name: str) -> None:
         bpy.ops.render.opengl(write_still=True, view_context=True)
 
 
+def overlay_times(kind: str, changed: bool, times: int) -> list[float]:
+    """Milliseconds of the processor for what the overlay of an editor is to draw, so many times.
+
+    changed: as if the view had moved since the redraw before.
+    """
+    view_module = importlib.import_module(f"{MODULE}.addon.overlay_view")
+    image_module = importlib.import_module(f"{MODULE}.addon.overlay_image")
+    area = next(area for area in window().screen.areas if area.type == kind)
+    inner = next(one for one in area.regions if one.type == "WINDOW")
+    of_kind = {"VIEW_3D": view_module.drawing_of, "IMAGE_EDITOR": image_module.drawings_of}
+    found = []
+    with bpy.context.temp_override(window=window(), area=area, region=inner):
+        of_kind[kind](bpy.context)
+        for _ in range(times):
+            if changed:
+                view_module._kept.forget()
+                image_module._kept.forget()
+            started = time.thread_time()
+            assert of_kind[kind](bpy.context) is not None
+            found.append(1e3 * (time.thread_time() - started))
+    return found
+
+
 def show_map(name: str) -> None:
     """An image in an Image editor, in the 3D view's place."""
     area = view()

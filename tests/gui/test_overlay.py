@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageGrab
 
+from tests.benchmarks import overlay as benchmark
 from tests.gui.window import HEIGHT, WIDTH, NotSeen, Window
 
 REGION = (255, 64, 199)
@@ -125,3 +126,10 @@ def test_over_the_map_suns_are_seen_and_clicked_on(suns: Window, quiet: None):
     name, x, y = alone(suns, "IMAGE_EDITOR")
     suns.click(x, y)
     suns.wait_for(f"selected() == [{name!r}]")
+
+
+def test_benchmark(suns: Window, quiet: None):
+    """A small version of the benchmark: that it measures, not how fast it is."""
+    results = benchmark.measure(suns, lights=6, redraws=3)
+    assert [len(one.times) for one in results] == [3] * 6
+    assert all("6 suns" in one.what and min(one.times) > 0 for one in results)
