@@ -5,7 +5,7 @@ import sys
 
 import bpy
 
-from . import command, operators, panel, presets, properties
+from . import command, operators, overlay, panel, presets, properties
 
 CLASSES = (
     properties.SunsplitLamp,
@@ -17,6 +17,7 @@ CLASSES = (
     operators.SUNSPLIT_OT_select_suns,
     presets.SUNSPLIT_OT_add_preset,
     panel.SUNSPLIT_PT_presets,
+    overlay.SUNSPLIT_OT_pick_sun,
     panel.SUNSPLIT_PT_main,
     panel.SUNSPLIT_PT_suns,
     panel.SUNSPLIT_PT_settings,
@@ -34,6 +35,7 @@ def register() -> None:
     bpy.types.Scene.sunsplit = bpy.props.PointerProperty(type=properties.SunsplitSettings)
     command.register()
     presets.register()
+    overlay.register()
     # Blender unregisters its add-ons when it ends. As a Python module it does not, and 4.5 then
     # hangs or crashes over any operator or panel that is left.
     if not bpy.app.binary_path:
@@ -44,6 +46,7 @@ def unregister() -> None:
     atexit.unregister(unregister)
     if not hasattr(bpy.types.Scene, "sunsplit"):
         return  # Blender disables an extension when it ends, after what `register` has asked for.
+    overlay.unregister()
     presets.unregister()
     command.unregister()
     del bpy.types.Scene.sunsplit

@@ -258,6 +258,16 @@ class SunsplitSettings(bpy.types.PropertyGroup):
             name="Light Tree Off", description="Restore switches Cycles' light tree on again"
         ),
         "before_passes": PointerProperty(type=SunsplitBeforePasses),
+        "show_overlay": BoolProperty(
+            name="Show Suns",
+            description="In the 3D view the suns on the sky and where their light comes from, in "
+            "the Image editor the bright region, its cells and the suns over the HDRI; a click on "
+            "a sun selects its lamp. Never in renders",
+            default=True,
+        ),
+        "outlines": StringProperty(
+            name="Outlines", description="The bright region and its cells, for the overlay"
+        ),
         "report": StringProperty(
             name="Report", description="What the last conversion did, a sentence a line"
         ),

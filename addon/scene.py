@@ -11,6 +11,7 @@ import bpy
 from ..core.conversion import Conversion
 from ..core.environment import LUMINANCE_WEIGHTS, EnvironmentMap
 from ..core.errors import UnusableInput
+from ..core.outlines import outlines_of
 from ..core.passes import parts_of, samples_of_passes
 from ..core.progress import Progress, silent
 from ..core.sampling import needs_light_tree
@@ -137,8 +138,11 @@ def conversion_steps(
     with folder_for_maps() as folder:
         maps = _maps_of(conversion, needs)
         paths = yield Apart(lambda *_: [write_map(folder, *made) for made in maps.items()], MADE, 1)
+        outlines = yield Apart(lambda *_: outlines_of(conversion).to_text(), 1, 1)
         images = {path.stem: packed_image(path) for path in paths}
-    return _replace(scene, light, conversion, images, settings, options, found)
+    result = _replace(scene, light, conversion, images, settings, options, found)
+    scene.sunsplit.outlines = outlines
+    return result
 
 
 def _world_to_convert(scene: bpy.types.Scene) -> bpy.types.World:
@@ -344,7 +348,7 @@ def restore_scene(scene: bpy.types.Scene) -> None:
     sky = state.sky
     state.original_world = state.converted_world = state.collection = state.sky = None
     state.lamps.clear()
-    state.report = ""
+    state.report = state.outlines = ""
     if state.light_tree_off and hasattr(scene, "cycles"):
         scene.cycles.use_light_tree = True
     state.light_tree_off = False

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .account import Account, settle
+from .cells import Cells
 from .environment import LUMINANCE_WEIGHTS, EnvironmentMap
 from .placement.choice import choose_suns
 from .progress import Progress, silent
@@ -26,19 +27,21 @@ from .whole_lights import suns_for_whole_lights
 class Conversion:
     """What became of a map.
 
-    suns: brightest first. residual: float32 (height, width, 3) of the width that was asked for,
-    or None. levelled: the same with all pixels of a wide map, where these were asked for; then
-    `residual` is as narrow as what was looked at. samples: what a Voronoi residual was made of,
-    else None. predicted_error: what shadows of the suns are wrong by, as a part of the mean
-    irradiance; see `prediction.Prediction`. ground_error: what level ground in the open gets wrong
-    of the worst channel, as a part of its irradiance. visible: what suns were chosen from, where
-    that is not the whole map. notes: plain sentences for the user.
+    suns: brightest first. cells: what light each took, None without suns. residual: float32
+    (height, width, 3) of the width that was asked for, or None. levelled: the same with all pixels
+    of a wide map, where these were asked for; then `residual` is as narrow as what was looked at.
+    samples: what a Voronoi residual was made of, else None. predicted_error: what shadows of the
+    suns are wrong by, as a part of the mean irradiance; see `prediction.Prediction`. ground_error:
+    what level ground in the open gets wrong of the worst channel, as a part of its irradiance.
+    visible: what suns were chosen from, where that is not the whole map. notes: plain sentences
+    for the user.
     """
 
     environment: EnvironmentMap
     settings: ConversionSettings
     strata: Strata
     suns: tuple[Sun, ...]
+    cells: Cells | None
     residual: NDArray[np.float32] | None
     levelled: LevelledPixels | None
     samples: MapOfSamples | None
@@ -104,6 +107,7 @@ def convert(
         settings,
         strata,
         chosen.suns,
+        chosen.taken and Cells(light.lit.pixels, chosen.taken, light.width, light.height),
         residual,
         levelled,
         samples,

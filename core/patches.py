@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
+from .cells import HALVES, squares_at, squares_of_pixels
 from .memo import Memo
 from .region import RegionLight
 
@@ -39,13 +40,15 @@ class Patches(Memo):
 
     directions: unit vectors to where each has its mean, (n, 3). flux: scalar irradiance, (n, 3).
     spread: how much its extent shortens a sum of directions, 1 - |mean direction|, (n,).
-    brightness: the largest among its pixels, in what `patches_of` was given, (n,).
+    brightness: the largest among its pixels, in what `patches_of` was given, (n,). squares: where
+    each lies on the map, (n, 3); see `cells.Taken`.
     """
 
     directions: Floats
     flux: Floats
     spread: Floats
     brightness: Floats
+    squares: NDArray[np.int32]
 
     def __len__(self) -> int:
         return len(self.flux)
@@ -71,7 +74,7 @@ def patches_of(light: RegionLight, brightness: Floats, most: int = MOST_PATCHES)
     for k in range(len(sums), 0, -1):
         divided = whole & (badness[k - 1] > limit)
         kept = whole & ~divided & (sums[k - 1][..., 3] > 0)
-        found.append(_blocks(sums[k - 1][kept], peaks[k - 1][kept], np.nonzero(kept)[0], k, light))
+        found.append(_blocks(sums[k - 1][kept], peaks[k - 1][kept], np.nonzero(kept), k, light))
         whole = divided.repeat(2, axis=0).repeat(2, axis=1)
     rows, columns = np.divmod(light.pixels, light.width)
     single = whole[rows, columns]
@@ -80,18 +83,18 @@ def patches_of(light: RegionLight, brightness: Floats, most: int = MOST_PATCHES)
 
 
 def _joined(parts: list[Patches]) -> Patches:
-    names = ("directions", "flux", "spread", "brightness")
+    names = ("directions", "flux", "spread", "brightness", "squares")
     return Patches(*(np.concatenate([getattr(one, name) for one in parts]) for name in names))
 
 
 def _pixels(light: RegionLight, brightness: Floats) -> Patches:
     """Each pixel as a patch, or as four if it holds much of the light and nothing tells where."""
     if light.given is not None:
-        return Patches(light.directions(), light.flux, light.spread(), brightness)
+        return _single(light, brightness)
     size = light.width, light.height
     four = light.luminous_flux > IN_FOUR * light.luminous_flux.sum()
     single, several = light.part(~four), light.part(four)
-    found = [Patches(single.directions(), single.flux, single.spread(), brightness[~four])]
+    found = [_single(single, brightness[~four])]
     finer = 2 * light.width, 2 * light.height
     rows, columns = np.divmod(several.pixels, light.width)
     solid, fine = sphere.row_solid_angles(*size)[rows], sphere.row_solid_angles(*finer)
@@ -104,9 +107,16 @@ def _pixels(light: RegionLight, brightness: Floats) -> Patches:
                 several.flux * (fine[row] / solid)[:, None],
                 sphere.pixel_spread(pixels, *finer),
                 brightness[four],
+                squares_at(row, 2 * columns + right, HALVES // 2),
             )
         )
     return _joined(found)
+
+
+def _single(light: RegionLight, brightness: Floats) -> Patches:
+    """Each pixel as a patch."""
+    squares = squares_of_pixels(light.pixels, light.width)
+    return Patches(light.directions(), light.flux, light.spread(), brightness, squares)
 
 
 def _limit(badness: list[Floats], most: int) -> float:
@@ -124,15 +134,17 @@ def _limit(badness: list[Floats], most: int) -> float:
 
 
 def _blocks(
-    sums: Floats, peaks: Floats, rows: NDArray[np.intp], k: int, light: RegionLight
+    sums: Floats, peaks: Floats, places: tuple[NDArray[np.intp], ...], k: int, light: RegionLight
 ) -> Patches:
-    """Blocks of 2^k pixels along a side, in these rows of blocks, as patches."""
+    """Blocks of 2^k pixels along a side, in these rows and columns of blocks, as patches."""
+    rows, columns = places
     luminous, vector = sums[:, 3], sums[:, 4:]
     length = np.linalg.norm(vector, axis=1)
     # Pixels spread too, each as wide as those in the block's middle row.
     middle = np.minimum((rows << k) + (1 << (k - 1)), light.height - 1)
     spread = np.maximum(1 - length / luminous, 0) + light.own_spread(middle)
-    return Patches(vector / length[:, None], sums[:, :3], spread, peaks)
+    squares = squares_at(rows, columns, HALVES << k)
+    return Patches(vector / length[:, None], sums[:, :3], spread, peaks, squares)
 
 
 def _pyramid(light: RegionLight, brightness: Floats) -> tuple[list[Floats], list[Floats]]:

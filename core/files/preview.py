@@ -9,6 +9,7 @@ from PIL import Image, ImageDraw, ImageFont
 from .. import sphere
 from ..conversion import Conversion
 from ..environment import LUMINANCE_WEIGHTS, luminance
+from ..outlines import lines_in_image
 from ..suns import Sun
 
 WIDTH = 1280
@@ -87,12 +88,10 @@ def outline(region: NDArray[np.bool_], width: int) -> Image.Image:
 
 
 def _draw_sun(draw: ImageDraw.ImageDraw, sun: Sun) -> None:
-    u, v = sphere.to_image(sphere.circle(sun.to_light, sun.angular_diameter / 2))
-    # Without jumps, and drawn again one width to either side: what leaves at the seam comes back.
-    circle = np.stack([np.unwrap(u, period=1) * WIDTH, v * WIDTH / 2], axis=-1)
+    for line in lines_in_image(sphere.circle(sun.to_light, sun.angular_diameter / 2)):
+        draw.line([(u * WIDTH, v * WIDTH / 2) for u, v in line], SUN, 2)
     centre = np.array(_place(sun))
-    for turn in (-WIDTH, 0, WIDTH):
-        draw.line([(x + turn, y) for x, y in circle], SUN, 2)
+    for turn in (-WIDTH, 0, WIDTH):  # what leaves at the seam comes back
         for step in ((1, 0), (-1, 0), (0, 1), (0, -1)):
             ends = [centre + (turn, 0) + reach * np.array(step) for reach in MARKER]
             draw.line([tuple(end) for end in ends], SUN, 2)

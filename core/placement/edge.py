@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..cells import Taken
 from ..environment import LUMINANCE_WEIGHTS
 from ..patches import Patches
 from ..settings import ConversionSettings
@@ -27,16 +29,24 @@ def edge_suns(
     notes = ()
     if settings.samples or settings.per_stratum or settings.position == "sample":
         notes = ("Samples, per stratum and position are of the other methods: edge has none.",)
-    return ChosenSuns(_suns(cells, patches, strata, settings), np.nan, notes)
+    order = np.argsort(-(cells.flux @ LUMINANCE_WEIGHTS), kind="stable")
+    rank = np.argsort(order)
+    taken = Taken(patches.squares, rank[cells.owner])
+    return ChosenSuns(_suns(cells, order, patches, strata, settings), np.nan, notes, taken=taken)
 
 
 def _suns(
-    cells: PatchCells, patches: Patches, strata: Strata, settings: ConversionSettings
+    cells: PatchCells,
+    order: NDArray[np.intp],
+    patches: Patches,
+    strata: Strata,
+    settings: ConversionSettings,
 ) -> tuple[Sun, ...]:
+    """The suns of cells in this order."""
     brightest = np.zeros(len(cells.flux))
     np.maximum.at(brightest, cells.owner, patches.brightness)
     suns = []
-    for cell in np.argsort(-(cells.flux @ LUMINANCE_WEIGHTS), kind="stable"):
+    for cell in order:
         flux, to_light = cells.flux[cell], cells.to_light[cell]
         # The rim of a light may be darker than region A, but belongs to it.
         stratum = max(strata.stratum(float(brightest[cell])), strata.count // 2 + 1)

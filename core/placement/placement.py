@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import sphere
+from ..cells import Taken
 from ..region import RegionLight
 from ..suns import Sun
 from ..voronoi import label_map, nearest
@@ -48,13 +49,15 @@ class ChosenSuns:
     """Suns, brightest first, and notes for the user.
 
     predicted_error: see `prediction.Prediction`. ground_error: of the irradiance of level ground in
-    the open, by the worst channel. Both nan before they are known.
+    the open, by the worst channel. Both nan before they are known. taken: the light of each, None
+    without suns.
     """
 
     suns: tuple[Sun, ...]
     predicted_error: float
     notes: tuple[str, ...]
     ground_error: float = np.nan
+    taken: Taken | None = None
 
     @property
     def worst(self) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import sphere
+from ..cells import Taken, squares_of_pixels
 from ..cluster import merge
 from ..environment import LUMINANCE_WEIGHTS
 from ..moments import Moments
@@ -43,15 +44,21 @@ def sampled_suns(
         if len(parts) > lights:
             notes.append(f"{len(parts)} strata want as many lights: placed in all of them at once.")
             parts = [light]
-    suns = []
+    suns, pixels, owner = [], [], []
     for part, count in zip(parts, _shared_out(parts, lights), strict=True):
         samples = settings.samples and max(round(count * settings.samples / lights), 1)
         placement = sample(part, int(count), settings, samples)
+        pixels.append(part.pixels)
+        owner.append(len(suns) + placement.owner)
         suns += _suns(part, placement, strata, settings)
-    suns.sort(key=lambda sun: -float(sun.scalar_irradiance @ LUMINANCE_WEIGHTS))
+    flux = np.array([sun.scalar_irradiance for sun in suns])
+    order = np.argsort(-(flux @ LUMINANCE_WEIGHTS), kind="stable")
+    squares = squares_of_pixels(np.concatenate(pixels), light.width)
+    taken = Taken(squares, np.argsort(order)[np.concatenate(owner)])
     if settings.lights and len(suns) < lights:
         notes.append(_fewer(len(suns), light, settings, lights))
-    return ChosenSuns(tuple(suns), np.nan, tuple(notes))
+    brightest_first = tuple(suns[number] for number in order)
+    return ChosenSuns(brightest_first, np.nan, tuple(notes), taken=taken)
 
 
 def sample(

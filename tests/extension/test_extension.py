@@ -167,6 +167,23 @@ def test_lock_has_wheels_for(blender: str, platform: str):
     assert ("colorama" in packages) == platform.startswith("windows")
 
 
+@pytest.mark.parametrize("platform", PLATFORMS)
+def test_another_python_gets_wheels_of_the_same_versions(platform: str):
+    packages = build_extension.locked_packages()
+    usual = build_extension.choose_wheels(packages, Target("5.2", platform))
+    other = build_extension.choose_wheels(packages, Target("5.2", platform, (3, 14)))
+    assert {(w.package, w.version) for w in other} == {(w.package, w.version) for w in usual}
+    tags = {wheel.file.split("-")[-3] for wheel in other}
+    assert "cp314" in tags
+    assert "cp313" not in tags
+
+
+def test_zip_for_another_python_says_so():
+    target = Target("5.2", "linux-x64", (3, 14))
+    assert target.suffix == "blender5.2-linux-x64-python3.14"
+    assert Target("5.2", "linux-x64").suffix == "blender5.2-linux-x64"
+
+
 def test_lacking_wheel_is_named():
     entry = {"url": "https://host/scipy-1.0-cp311-cp311-win_amd64.whl", "hashes": {"sha256": "0"}}
     packages = [{"name": "scipy", "version": "1.0", "wheels": [entry]}]

@@ -45,6 +45,7 @@ def save_panel(window: Window, path: Path) -> None:
     """The panel after a conversion, for README."""
     window.press("sunsplit.convert")
     window.wait_for("is_converted()", 300)
+    window.unfold("SUNSPLIT_PT_settings")
     window.panel_picture().save(path)
 
 

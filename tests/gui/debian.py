@@ -12,8 +12,9 @@ import hashlib
 import os
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,6 +41,10 @@ OPTIONS = (
 )
 
 
+SHARED = "sunsplit-"
+"""How the names of folders begin that a window and its tests share."""
+
+
 class Unavailable(Exception):
     """Why there can be no such Blender on this machine."""
 
@@ -64,8 +69,12 @@ class Debian:
 
     def environment(self, home: str = "/root") -> dict[str, str]:
         """All that programs there get to know, as paths from inside; Blender keeps to its home."""
-        programs = "/usr/sbin:/usr/bin:/sbin:/bin"
-        return {"PATH": programs, "HOME": home, "BLENDER_USER_RESOURCES": f"{home}/blender"}
+        return {
+            "PATH": "/usr/sbin:/usr/bin:/sbin:/bin",
+            "HOME": home,
+            "TMPDIR": home,
+            "BLENDER_USER_RESOURCES": f"{home}/blender",
+        }
 
     def ask(self, *arguments: str, home: str = "/root") -> str:
         """What a program there prints. Raises CalledProcessError."""
@@ -79,6 +88,21 @@ class Debian:
             env=self.environment(home),
         )
         return done.stdout.strip()
+
+    @contextmanager
+    def shared_folder(self) -> Iterator[Path]:
+        """An empty folder that both sides see, for as long as the block takes."""
+        place = self.root / "tmp"
+        for old in place.glob(f"{SHARED}*"):
+            # One that nobody holds is of tests that were killed.
+            with suppress(BlockingIOError, FileNotFoundError), _held(old):
+                shutil.rmtree(old)
+        folder = Path(tempfile.mkdtemp(prefix=SHARED, dir=place))
+        with _held(folder):
+            try:
+                yield folder
+            finally:
+                shutil.rmtree(folder)
 
     @property
     def blender(self) -> str:
@@ -124,11 +148,23 @@ def _alone(path: Path) -> Iterator[None]:
         yield
 
 
+@contextmanager
+def _held(folder: Path) -> Iterator[None]:
+    """Hold a folder's lock. Raises BlockingIOError if another process does."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(handle)
+
+
 def _install_tools() -> None:
     packages = [package for tool, package in TOOLS.items() if shutil.which(tool) is None]
     if packages:
         _run(["apt-get", "update", "-qq"])
-        _run(["apt-get", "install", "-y", "-qq", "--no-install-recommends", *packages])
+        options = ("-y", "-qq", "--no-install-recommends", "-o", "DPkg::Lock::Timeout=60")
+        _run(["apt-get", "install", *options, *packages])
 
 
 def _build(root: Path) -> None:

@@ -15,9 +15,11 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
 
 import bpy
+from mathutils import Euler
 
 FOLDER = Path(sys.argv[sys.argv.index("--") + 1])
 MODULE = "bl_ext.user_default.sunsplit"
@@ -35,6 +37,8 @@ def main() -> None:
     preferences.filepaths.use_auto_save_temporary_files = False
     # The sidebar beside the view, not over it: what is in it stands on one colour.
     preferences.system.use_region_overlap = False
+    # The processor draws: eight times for smooth edges is too much.
+    preferences.system.viewport_aa = "OFF"
     bpy.app.timers.register(tick, first_interval=TICK, persistent=True)
 
 
@@ -254,32 +258,116 @@ def hovered() -> str:
     return manager.clipboard.removeprefix("bpy.ops.").partition("(")[0]
 
 
-SPENT: list[float] = []
-"""Milliseconds of each panel that the sidebar has drawn since the last look."""
+DRAWN: dict[str, float] = {}
+"""Milliseconds that each of the extension's panels has taken in the last redraw."""
 
 
-def time_panels() -> None:
-    """From now on, keep the time of each of the extension's panels that is drawn."""
+def redraw() -> dict[str, float]:
+    """Have the sidebar drawn anew; the panels drawn since the last call, with their times.
+
+    A panel that is folded is not drawn.
+    """
     for cls in bpy.types.Panel.__subclasses__():
-        if cls.__module__.startswith(MODULE):
-            cls.draw = timed(cls.draw)
+        if cls.__module__.startswith(MODULE) and not hasattr(cls.draw, "__wrapped__"):
+            cls.draw = timed(cls.draw, cls.__name__)
+    drawn = dict(DRAWN)
+    DRAWN.clear()
+    region("UI").tag_redraw()
+    return drawn
 
 
-def timed(work: Callable) -> Callable:
+def timed(work: Callable, name: str) -> Callable:
+    @wraps(work)
     def draw(self: object, context: object) -> None:
         started = time.perf_counter()
         work(self, context)
-        SPENT.append(1e3 * (time.perf_counter() - started))
+        DRAWN[name] = 1e3 * (time.perf_counter() - started)
 
     return draw
 
 
-def redraw() -> float:
-    """Have the sidebar drawn anew; milliseconds of the panels since this was last called."""
-    spent = sum(SPENT)
-    SPENT.clear()
-    region("UI").tag_redraw()
-    return spent
+# The overlay
+
+
+def look_at_sun(number: int, aside: float) -> None:
+    """Turn the 3D view to a lamp of the conversion, an angle in radians aside of it."""
+    lamp = bpy.context.scene.sunsplit.lamps[number].lamp
+    towards = Euler((0, 0, aside)).to_matrix() @ lamp.matrix_world.col[2].xyz
+    space = view().spaces.active
+    space.shading.type = "SOLID"
+    space.region_3d.view_perspective = "PERSP"
+    space.region_3d.view_rotation = (-towards).to_track_quat("Z", "Y")
+    region("WINDOW").tag_redraw()
+
+
+def suns_seen(kind: str = "VIEW_3D") -> list[list]:
+    """Name, x and y of each sun that an editor shows and that is in sight; rows downwards."""
+    area = next(area for area in window().screen.areas if area.type == kind)
+    inner = next(one for one in area.regions if one.type == "WINDOW")
+    with bpy.context.temp_override(window=window(), area=area, region=inner):
+        pick = importlib.import_module(f"{MODULE}.addon.pick")
+        suns, marks = pick.suns_on_screen(bpy.context)
+    rows = window().height - 1 - inner.y
+    places = marks.place[~marks.aside].round().astype(int).tolist()
+    names = [lamp.name for lamp, aside in zip(suns.lamps, marks.aside, strict=True) if not aside]
+    return [[name, inner.x + x, rows - y] for name, (x, y) in zip(names, places, strict=True)]
+
+
+def selected() -> list[str]:
+    return sorted(one.name for one in window().view_layer.objects.selected)
+
+
+def show_overlay(on: bool) -> None:
+    bpy.context.scene.sunsplit.show_overlay = on
+    for area in window().screen.areas:
+        area.tag_redraw()
+
+
+def viewport_render(name: str) -> None:
+    """Blender's own render of the 3D view, into the folder."""
+    bpy.context.scene.render.filepath = str(FOLDER / name)
+    with bpy.context.temp_override(window=window(), area=view(), region=region("WINDOW")):
+        bpy.ops.render.opengl(write_still=True, view_context=True)
+
+
+def overlay_times(kind: str, changed: bool, times: int) -> list[float]:
+    """Milliseconds of the processor for what the overlay of an editor is to draw, so many times.
+
+    changed: as if the view had moved since the redraw before.
+    """
+    view_module = importlib.import_module(f"{MODULE}.addon.overlay_view")
+    image_module = importlib.import_module(f"{MODULE}.addon.overlay_image")
+    area = next(area for area in window().screen.areas if area.type == kind)
+    inner = next(one for one in area.regions if one.type == "WINDOW")
+    of_kind = {"VIEW_3D": view_module.drawing_of, "IMAGE_EDITOR": image_module.drawings_of}
+    found = []
+    with bpy.context.temp_override(window=window(), area=area, region=inner):
+        of_kind[kind](bpy.context)
+        for _ in range(times):
+            if changed:
+                view_module._kept.forget()
+                image_module._kept.forget()
+            started = time.thread_time()
+            assert of_kind[kind](bpy.context) is not None
+            found.append(1e3 * (time.thread_time() - started))
+    return found
+
+
+def show_map(name: str) -> None:
+    """An image in an Image editor, in the 3D view's place."""
+    area = view()
+    area.type = "IMAGE_EDITOR"
+    area.spaces.active.image = bpy.data.images[name]
+    inner = next(one for one in area.regions if one.type == "WINDOW")
+    with bpy.context.temp_override(window=window(), area=area, region=inner):
+        bpy.ops.image.view_all(fit_view=True)
+
+
+def show_view() -> None:
+    """The 3D view in its place again."""
+    for area in window().screen.areas:
+        if area.type == "IMAGE_EDITOR":
+            area.type = "VIEW_3D"
 
 
 main()

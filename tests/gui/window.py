@@ -18,7 +18,6 @@ import json
 import os
 import shutil
 import subprocess
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -39,10 +38,16 @@ STEP = 9
 """Pixels from one try to the next where a button is looked for: a button is 20 high."""
 
 
-DRAGS = 20
+DRAGS = 10
 """Movements of a drag."""
 
-TABS, MARGIN = 22, 8
+WITH_US = ("setpriv", "--pdeathsig", "KILL")
+"""A program behind these words ends when the tests end, even when they are killed."""
+
+FOLDING = 0.3
+"""Seconds that a panel takes to fold."""
+
+TABS, MARGIN = 28, 8
 """Pixels: width of the tabs at the sidebar's right side; what is left below the last panel."""
 
 
@@ -124,6 +129,13 @@ class Window:
         self.settle()
         self._do("click", 1)
 
+    def hold(self, key: str) -> None:
+        self._do("keydown", key)
+        self.settle()
+
+    def release(self, key: str) -> None:
+        self._do("keyup", key)
+
     def key(self, name: str) -> None:
         """Press a key over the 3D view, as `ctrl+z` or `Escape`."""
         left, top, width, height = self.ask("place('WINDOW')")
@@ -174,15 +186,49 @@ class Window:
             self.settle()
 
     def find(self, name: str) -> tuple[int, int]:
-        """Where in the sidebar the button of an operator or property is: `sunsplit.convert`."""
-        left, top, width, height = self.ask("place('UI')")
-        x = left + (width - TABS) // 2
-        for y in range(top + STEP, top + height, STEP):
+        """Where the sidebar has the button of an operator or property, as `sunsplit.convert`."""
+        for x, y in self._rows():
             self.move(x, y)
             self.settle()
             if self.ask("hovered()") == name:
-                return x, y
+                self.settle()  # the mouse may have been seen at the row before
+                if self.ask("hovered()") == name:
+                    return x, y
         raise NotSeen(f"No button {name} in the sidebar.")
+
+    def unfold(self, panel: str) -> None:
+        """Click on the header of a folded panel, as `SUNSPLIT_PT_settings`, where it is in sight.
+
+        A header is found by what a click does; a click on another one is taken back.
+        """
+        before = self._drawn()
+        if panel in before:
+            return
+        for x, y in self._rows():
+            self.move(x, y)
+            self.settle()
+            if self.ask("hovered()"):
+                continue
+            self._do("click", 1)
+            after = self._drawn()
+            if panel in after:
+                return
+            if after != before:
+                self._do("click", 1)
+                before = self._drawn()
+        raise NotSeen(f"No header of {panel} in the sidebar.")
+
+    def _rows(self) -> list[tuple[int, int]]:
+        """Points down the sidebar, where buttons are that are half as wide as it or wider."""
+        left, top, width, height = self.ask("place('UI')")
+        x = left + round(0.6 * (width - TABS))
+        return [(x, y) for y in range(top + STEP, top + height, STEP)]
+
+    def _drawn(self) -> set[str]:
+        """The panels that are not folded."""
+        time.sleep(FOLDING)
+        self.ask("redraw()")
+        return set(self.ask("redraw()"))  # between two ticks, Blender draws what it has to
 
     def press(self, name: str) -> None:
         """Click the button of an operator."""
@@ -213,18 +259,19 @@ class Window:
 def open_window(debian: Debian, sky: Path) -> Iterator[Window]:
     """A Blender in a display of its own, with a map at hand; it ends with the block."""
     with ExitStack() as stack:
-        folder = Path(tempfile.mkdtemp(prefix="sunsplit-", dir=debian.root / "tmp"))
-        stack.callback(shutil.rmtree, folder)
+        folder = stack.enter_context(debian.shared_folder())
         shutil.copy2(sky, folder / "sky.hdr")
         shutil.copy2(INSIDE, folder / INSIDE.name)
         display = stack.enter_context(_display())
         here = debian.inside(folder)
-        environment = debian.environment(here) | {"DISPLAY": display}
         command = ["blender", "--window-geometry", "0", "0", str(WIDTH), str(HEIGHT)]
         command += ["--python-exit-code", "1", "--python", f"{here}/{INSIDE.name}", "--", here]
         with (folder / "console").open("w") as console:
             process = subprocess.Popen(
-                debian.command(*command), env=environment, stdout=console, stderr=console
+                [*WITH_US, *debian.command(*command)],
+                env=debian.environment(here) | {"DISPLAY": display},
+                stdout=console,
+                stderr=console,
             )
         stack.callback(_end, process)
         window = Window(debian, folder, display, process)
@@ -238,7 +285,7 @@ def _display() -> Iterator[str]:
     read, write = os.pipe()
     screen = ["-screen", "0", f"{WIDTH}x{HEIGHT}x24"]
     process = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), *screen, "-nolisten", "tcp"],
+        [*WITH_US, "Xvfb", "-displayfd", str(write), *screen, "-nolisten", "tcp"],
         pass_fds=[write],
         stderr=subprocess.DEVNULL,
     )
