@@ -29,6 +29,7 @@ CHOICES = {
                 "EEVEE",
                 "The world casts no shadows: with an automatic share more of it becomes lamps",
             ),
+            ("both", "Both", "As EEVEE, and right in Cycles with the same lamps"),
             ("export", "Export", "As EEVEE, and the whole map may become lamps"),
         ],
         default=DEFAULTS.target,
@@ -237,6 +238,18 @@ class SunsplitBeforePasses(bpy.types.PropertyGroup):
     }
 
 
+class SunsplitBeforeEevee(bpy.types.PropertyGroup):
+    """Settings of EEVEE as they were before a conversion changed them, where it did: `is_set`."""
+
+    __annotations__ = {
+        "is_set": BoolProperty(),
+        "use_shadows": BoolProperty(),
+        "shadow_steps": IntProperty(),
+        "shadow_pool": StringProperty(),
+        "clamp_indirect": FloatProperty(),
+    }
+
+
 class SunsplitSettings(bpy.types.PropertyGroup):
     """Settings of the next conversion, and what the last one has made."""
 
@@ -255,6 +268,7 @@ class SunsplitSettings(bpy.types.PropertyGroup):
             name="Light Tree Off", description="Restore switches Cycles' light tree on again"
         ),
         "before_passes": PointerProperty(type=SunsplitBeforePasses),
+        "before_eevee": PointerProperty(type=SunsplitBeforeEevee),
         "report": StringProperty(
             name="Report", description="What the last conversion did, a sentence a line"
         ),

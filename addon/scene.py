@@ -14,7 +14,7 @@ from ..core.passes import parts_of, samples_of_passes
 from ..core.sampling import needs_light_tree
 from ..core.settings import ConversionSettings
 from ..core.visible import visible_part
-from . import passes
+from . import eevee, passes
 from .known import known_conversion
 from .lamps import link_lamps, make_lamps, remove_lamps, unlink_lamps
 from .light_groups import put_into_groups, remove_groups
@@ -138,6 +138,8 @@ def convert_scene(
     result = _install(scene, original, conversion, new, lamps)
     if tree_off:
         scene.cycles.use_light_tree, state.light_tree_off = False, True
+    if settings.in_eevee or "EEVEE" in scene.render.engine:
+        eevee.apply(scene, lamps)
     if options.two_passes:
         sentences += _add_pass(scene, conversion, found.other_lights)
     if options.light_groups:
@@ -294,6 +296,7 @@ def restore_scene(scene: bpy.types.Scene) -> None:
             scene.world = original
         _swap_overrides(scene, converted, original)
     passes.remove_suns_layer(scene)
+    eevee.take_back(scene)
     remove_groups(scene.view_layers)
     state.original_world = state.converted_world = state.collection = None
     state.lamps.clear()
