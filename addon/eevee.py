@@ -18,7 +18,7 @@ CASTERS = ("MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "POINTCLOUD")
 
 STEPS = 16
 """Places at which EEVEE looks for what is before a lamp: as many as it can. A picture lit by wide
-lamps, of Blender's courtyard, was wrong by 14 % with six, by 8 % with sixteen, by 3 % with jitter."""
+lamps was wrong by 14 % with six, by 8 % with sixteen, by 3 % with jitter."""
 
 TEXELS = 2048
 """Of a lamp's shadow map along the way through the scene, as the tangent of the lamp's half-angle
