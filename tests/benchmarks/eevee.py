@@ -1,6 +1,7 @@
 """Does EEVEE show after a conversion what Cycles shows? Errors and seconds of a frame.
 
-    .venv-5.2/bin/python -m tests.benchmarks.eevee MAP ... [-o FOLDER] [--plates] [--samples 16]
+    .venv-5.2/bin/python -m tests.benchmarks.eevee MAP ... [-o FOLDER] [--scenes shadows plate]
+        [--analytic "one sun" "two opposite suns" "one unclipped sun"] [--samples 16]
 
 EEVEE with the plain HDRI as it comes, at sun threshold 0, and converted for EEVEE, each against
 Cycles with the plain HDRI, direct light only: on three maps whose light is known in closed form
@@ -10,6 +11,7 @@ and on those given, a plate in eight orientations and a scene with shadows.
 from __future__ import annotations
 
 import argparse
+import ctypes
 import json
 import subprocess
 import sys
@@ -28,7 +30,13 @@ from tests.maps import direction, paint_disc, sky
 
 WAYS = ("default", "zero", "converted")
 
-ORIENTATIONS = 8
+ANALYTIC = {
+    "one sun": [(40, 40, 2, 1000)],
+    "two opposite suns": [(0, 30, 2, 1000), (180, 30, 2, 1000)],
+    "one unclipped sun": [(40, 68, 0.5, 5e5)],
+}
+"""Azimuth, elevation and radius of discs in degrees, and their radiance, in a sky of 0.5. The last
+is beyond half floats."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,20 +93,14 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def analytic_maps(folder: Path) -> list[Path]:
-    """One sun; two opposite suns; one unclipped sun beyond half floats."""
-    found = {}
-    for name, discs in (
-        ("one sun", [(40, 40, 2, 1000)]),
-        ("two opposite suns", [(0, 30, 2, 1000), (180, 30, 2, 1000)]),
-        ("one unclipped sun", [(40, 68, 0.5, 5e5)]),
-    ):
-        pixels = sky(1024, 0.5)
-        for azimuth, elevation, radius, radiance in discs:
-            paint_disc(pixels, direction(azimuth, elevation), radius, radiance)
-        found[name] = folder / f"{name}.exr"
-        exr.write(found[name], pixels.astype(np.float32))
-    return list(found.values())
+def analytic_map(folder: Path, name: str) -> Path:
+    """One of `ANALYTIC`, written as a file."""
+    pixels = sky(1024, 0.5)
+    for azimuth, elevation, radius, radiance in ANALYTIC[name]:
+        paint_disc(pixels, direction(azimuth, elevation), radius, radiance)
+    path = folder / f"{name}.exr"
+    exr.write(path, pixels.astype(np.float32))
+    return path
 
 
 def plates_of(path: Path, normals: np.ndarray) -> np.ndarray:
@@ -113,7 +115,7 @@ def plates_of(path: Path, normals: np.ndarray) -> np.ndarray:
 
 
 def measure(path: Path, scene: str, options: argparse.Namespace) -> Result:
-    """Render in a process of its own. Raises EeveeUnusable where that ends early."""
+    """Render in a process of its own. Raises RuntimeError where that ends early."""
     with tempfile.TemporaryDirectory(prefix="eevee-") as name:
         command = [sys.executable, "-m", "tests.benchmarks.eevee_renders", str(path), name]
         command += ["--scene", scene, "--samples", str(options.samples)]
@@ -123,15 +125,24 @@ def measure(path: Path, scene: str, options: argparse.Namespace) -> Result:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         report = Path(name) / "renders.json"
         if done.returncode or not report.exists():
-            raise EeveeUnusable(f"{path.stem}: {done.stderr[-2000:] or done.stdout[-2000:]}")
+            said = (done.stdout + done.stderr)[-2000:]
+            raise RuntimeError(f"{path.stem}: Blender ended with {done.returncode}: {said}")
         if "Shadow buffer full" in done.stdout + done.stderr:
             print(f"{path.stem}: the shadow buffer was full", file=sys.stderr)
         images = {one.stem: np.load(one) for one in sorted(Path(name).glob("*.npy"))}
         return Result(**json.loads(report.read_text(encoding="utf-8")), images=images)
 
 
-class EeveeUnusable(RuntimeError):
-    """EEVEE did not render here."""
+def without_eevee() -> str:
+    """Why EEVEE cannot render here, or nothing: without a vendor's EGL it ends the process."""
+    try:
+        egl = ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        return "EEVEE needs libEGL.so.1 (Debian: libegl1)"
+    egl.eglGetDisplay.restype = ctypes.c_void_p
+    if not egl.eglGetDisplay(None):
+        return "EEVEE needs EGL of some vendor (Debian: libegl-mesa0, libgl1-mesa-dri)"
+    return ""
 
 
 def main(arguments: Sequence[str] | None = None) -> list[Result]:
@@ -139,7 +150,7 @@ def main(arguments: Sequence[str] | None = None) -> list[Result]:
     parser.add_argument("maps", nargs="*", type=Path, metavar="MAP")
     parser.add_argument("-o", "--output", type=Path, default=Path("out"))
     parser.add_argument("--name", default="eevee", help="of the files")
-    parser.add_argument("--analytic", action="store_true", help="the three maps of closed form")
+    parser.add_argument("--analytic", nargs="*", choices=ANALYTIC, help="maps of closed form")
     parser.add_argument("--scenes", nargs="*", default=["shadows"], help="for each given map")
     parser.add_argument("--size", type=int)
     parser.add_argument("--samples", type=int, default=16, help="of EEVEE")
@@ -148,7 +159,7 @@ def main(arguments: Sequence[str] | None = None) -> list[Result]:
     options.output.mkdir(parents=True, exist_ok=True)
     results: list[Result] = []
     with tempfile.TemporaryDirectory(prefix="eevee-maps-") as name:
-        known = [(path, "plate") for path in analytic_maps(Path(name))] if options.analytic else []
+        known = [(analytic_map(Path(name), one), "plate") for one in options.analytic or ()]
         for path, scene in known + [(p, s) for s in options.scenes for p in options.maps]:
             result = measure(path, scene, options)
             if scene == "plate":
