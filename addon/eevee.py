@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 from mathutils import Vector
+from numpy.typing import NDArray
 
 CASTERS = ("MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "POINTCLOUD")
 """Types of things that cast shadows."""
@@ -33,6 +34,9 @@ WIDE = np.radians(3)
 
 OVERBLUR = 10.0
 """Percent of a disc that is traced around each place on it: Blender's default."""
+
+BRIGHTEST = 65_504
+"""EEVEE keeps the world in half floats."""
 
 MEGABYTES = 25
 """Of shadow maps that a lamp takes, sharp ones too, as measured with 32 of them."""
@@ -66,6 +70,19 @@ def take_back(scene: bpy.types.Scene) -> None:
     settings.shadow_pool_size = before.shadow_pool
     settings.clamp_surface_indirect = before.clamp_indirect
     before.is_set = False
+
+
+def losses(residual: NDArray[np.float32] | None, gain: NDArray[np.float64]) -> list[str]:
+    """What EEVEE's world cannot hold, a sentence or none.
+
+    residual: radiance, (height, width, 3). gain: from it to the scene's, (3,).
+    """
+    if residual is None or (residual.max(axis=(0, 1)) * gain).max() <= BRIGHTEST:
+        return []
+    return [
+        f"The world is brighter than {BRIGHTEST:,} in places, which EEVEE cuts off: a larger "
+        "share, or an automatic one, makes lamps of it."
+    ]
 
 
 def target_for(target: str, engine: str) -> str:

@@ -130,6 +130,9 @@ def convert_scene(
         *_skipped(conversion, settings, needs, tree_off),
         *_warnings(scene, world, original, light),
     ]
+    for_eevee = settings.in_eevee or "EEVEE" in scene.render.engine
+    if for_eevee:
+        sentences += eevee.losses(conversion.residual, light.gain)
     new = converted_world(world, light, conversion, needs.camera_sees_world, camera_width)
     lamps = make_lamps(conversion.suns, light, new)
     # From here on `light` must not be used: its nodes go with the world that is replaced.
@@ -138,7 +141,7 @@ def convert_scene(
     result = _install(scene, original, conversion, new, lamps)
     if tree_off:
         scene.cycles.use_light_tree, state.light_tree_off = False, True
-    if settings.in_eevee or "EEVEE" in scene.render.engine:
+    if for_eevee:
         eevee.apply(scene, lamps)
     if options.two_passes:
         sentences += _add_pass(scene, conversion, found.other_lights)

@@ -66,7 +66,7 @@ def choose_suns(
         chosen = _judged(chosen, prediction, strata)
     else:
         chosen = _fewest_by_edge(light, strata, settings, prediction, allowed / 100)
-    notes = (*chosen.notes, *_count_note(chosen, light, settings, allowed))
+    notes = (*chosen.notes, *_count_note(chosen, light, settings, prediction, allowed))
     return replace(chosen, notes=notes)
 
 
@@ -122,16 +122,22 @@ def _patches(light: RegionLight, strata: Strata, most: int) -> Patches:
 
 
 def _count_note(
-    chosen: ChosenSuns, light: RegionLight, settings: ConversionSettings, allowed: float | None
+    chosen: ChosenSuns,
+    light: RegionLight,
+    settings: ConversionSettings,
+    prediction: Prediction,
+    allowed: float | None,
 ) -> list[str]:
     """Why there are not as many lights as were asked for, or not as few errors."""
     made, asked = len(chosen.suns), settings.lights
     percent = 100 * chosen.worst
     if allowed is not None and percent > allowed:
         more = "" if asked else ": set the number of lights for more"
+        if 100 * prediction.of_residual > allowed:
+            more = ": the rest of the map is shown without shadows, and no lights mend that"
         return [
             f"{made} lights are predicted to be wrong by {percent:.2g} %, which is more than the "
-            f"{allowed:g} % allowed{more}."
+            f"{allowed:.3g} % allowed{more}."
         ]
     if asked is None or made == asked:
         return []

@@ -8,7 +8,16 @@ import pytest
 from mathutils import Matrix
 
 from sunsplit.addon import eevee
-from tests.blender import add_mesh, box_mesh, diffuse, fresh_scene, hdri_world, suns, write_map
+from tests.blender import (
+    add_mesh,
+    box_mesh,
+    diffuse,
+    fresh_scene,
+    hdri_world,
+    node,
+    suns,
+    write_map,
+)
 from tests.maps import direction, paint_disc, sky
 
 EEVEE = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
@@ -104,6 +113,17 @@ def test_an_empty_scene_is_set_up_too(scene):
     bpy.data.objects.remove(bpy.data.objects["Box"])
     bpy.ops.sunsplit.convert(target="eevee")
     assert all(lamp.data.shadow_maximum_resolution > 0 for lamp in suns(scene))
+
+
+def test_what_eevee_would_cut_off_is_said(scene, sunrise):
+    hdri_world(scene, sunrise)  # brighter than half floats hold
+    bpy.ops.sunsplit.convert(target="eevee", share=0)
+    assert "which EEVEE cuts off" in scene.sunsplit.report
+    bpy.ops.sunsplit.convert(target="eevee", share=0.5)
+    assert "cuts off" not in scene.sunsplit.report
+    node(scene.world.node_tree, "BACKGROUND").inputs["Strength"].default_value = 1e5
+    bpy.ops.sunsplit.convert(target="eevee", share=0.5)
+    assert "which EEVEE cuts off" in scene.sunsplit.report
 
 
 @pytest.mark.parametrize(
