@@ -32,6 +32,9 @@ from .world import (
     unconverted,
 )
 
+ALL_LIGHT = 0.999
+"""Of all light, in lamps: the rest shows nowhere."""
+
 LEAST_SAID = 0.0005
 """Of all light: less of it that reaches nothing is not worth a sentence."""
 
@@ -154,7 +157,10 @@ def convert_scene(
 def _without_excess(
     settings: ConversionSettings, width: int, needs: SceneNeeds
 ) -> ConversionSettings:
-    """With a residual so wide that nothing could tell it from one as wide as the map."""
+    """With a residual so wide that nothing could tell it from one as wide as the map, and none for
+    mirrors where there are none."""
+    if settings.in_eevee:
+        settings = replace(settings, mirrors=needs.mirrors)
     if settings.residual_width is not None:
         return settings
     narrower = needs.residual_width(width)
@@ -204,6 +210,11 @@ def _skipped(
         why = "the camera is too coarse for more" if needs.mirrors else "nothing mirrors sharply"
         lines.append(
             f"Skipped: {why}, so the world that lights is {width} pixels wide instead of {own}."
+        )
+    if not (conversion.settings.mirrors or conversion.account.share < ALL_LIGHT):
+        lines.append(
+            "Skipped: nothing mirrors sharply, so all light is in lamps, which EEVEE shadows; only "
+            "the camera sees the world."
         )
     shown = needs.width_for_camera(own)
     if not needs.camera_sees_world:

@@ -67,6 +67,8 @@ class ConversionSettings:
     residual_width: pixels, a whole part of the map's width, "own" for all of them, or None: as
         many as light needs, about 1,024; mirrors and backgrounds may show that it is not sharp.
     residual_samples: how many samples a Voronoi map is made of.
+    mirrors: whether something may show the residual sharply. Where nothing does, suns in EEVEE may
+        hold all light, as what is left would be without shadows.
     fill: what the residual shows in region A: its "surroundings", with only what exceeds them
         given to suns, or "black" (the paper's), with all light given to them. None: surroundings
         with the method "edge", black with the others.
@@ -86,6 +88,7 @@ class ConversionSettings:
     residual: ResidualKind = "map"
     residual_width: ResidualWidth = None
     residual_samples: int = 500
+    mirrors: bool = True
     fill: Fill | None = None
 
     def __post_init__(self) -> None:

@@ -103,7 +103,7 @@ def _truest(environment: EnvironmentMap, settings: ConversionSettings) -> Strata
     best = stratify(environment, None, settings.strata)
     least, before, rises = _error(environment, best, settings), np.inf, 0
     for share in SHARES:
-        if share > MOST_OF_A_WORLD and settings.in_eevee:
+        if share > MOST_OF_A_WORLD and settings.in_eevee and settings.mirrors:
             continue
         strata = stratify(environment, share, settings.strata)
         error = _error(environment, strata, settings)

@@ -19,7 +19,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from sunsplit.addon.scene import SceneOptions, convert_scene
+from sunsplit.addon.scene import convert_scene
 from sunsplit.core.settings import ConversionSettings
 from tests.benchmarks.table1_scene import key_azimuth
 from tests.blender import (
@@ -179,7 +179,7 @@ def main() -> None:
     scene.world.sun_threshold = 0.0
     keep(ZERO, EEVEE, options.samples)
     settings = ConversionSettings(target="eevee")
-    found = convert_scene(scene, settings, SceneOptions(skips=False)).conversion
+    found = convert_scene(scene, settings).conversion
     pictures(scene, folder, EEVEE, 1)
     keep(CONVERTED, EEVEE, options.samples)
     keep(CONVERTED_IN_CYCLES, "CYCLES", options.reference)
