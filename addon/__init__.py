@@ -10,6 +10,7 @@ from . import command, operators, overlay, panel, presets, properties
 CLASSES = (
     properties.SunsplitLamp,
     properties.SunsplitBeforePasses,
+    properties.SunsplitBeforeEevee,
     properties.SunsplitSettings,
     operators.SUNSPLIT_OT_convert,
     operators.SUNSPLIT_OT_restore,

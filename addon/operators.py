@@ -35,8 +35,9 @@ class SUNSPLIT_OT_convert(InSteps, bpy.types.Operator):
     def work(self, context: bpy.types.Context) -> Steps[SceneConversion]:
         from .scene import conversion_steps, options_for, settings_for
 
-        chosen = self._chosen(context.scene.sunsplit)
-        return conversion_steps(context.scene, settings_for(chosen), options_for(chosen))
+        scene, chosen = context.scene, self._chosen(context.scene.sunsplit)
+        settings = settings_for(chosen, scene.render.engine)
+        return conversion_steps(scene, settings, options_for(chosen))
 
     def done(self, context: bpy.types.Context, result: SceneConversion) -> set[str]:
         for name, value in self._chosen(context.scene.sunsplit).items():

@@ -23,15 +23,17 @@ CHOICES = {
         name="Target",
         description="What shows the result",
         items=[
+            ("auto", "Render Engine", "EEVEE for a scene that EEVEE renders, else Cycles"),
             ("cycles", "Cycles", "The world keeps its shadows: lamps for what would make noise"),
             (
                 "eevee",
                 "EEVEE",
                 "The world casts no shadows: with an automatic share more of it becomes lamps",
             ),
+            ("both", "Both", "As EEVEE, and right in Cycles with the same lamps"),
             ("export", "Export", "As EEVEE, and the whole map may become lamps"),
         ],
-        default=DEFAULTS.target,
+        default="auto",
         options=_FRESH,
     ),
     "lights": IntProperty(
@@ -237,6 +239,18 @@ class SunsplitBeforePasses(bpy.types.PropertyGroup):
     }
 
 
+class SunsplitBeforeEevee(bpy.types.PropertyGroup):
+    """Settings of EEVEE as they were before a conversion changed them, where it did: `is_set`."""
+
+    __annotations__ = {
+        "is_set": BoolProperty(),
+        "use_shadows": BoolProperty(),
+        "shadow_steps": IntProperty(),
+        "shadow_pool": StringProperty(),
+        "clamp_indirect": FloatProperty(),
+    }
+
+
 class SunsplitSettings(bpy.types.PropertyGroup):
     """Settings of the next conversion, and what the last one has made."""
 
@@ -268,6 +282,7 @@ class SunsplitSettings(bpy.types.PropertyGroup):
         "outlines": StringProperty(
             name="Outlines", description="The bright region and its cells, for the overlay"
         ),
+        "before_eevee": PointerProperty(type=SunsplitBeforeEevee),
         "report": StringProperty(
             name="Report", description="What the last conversion did, a sentence a line"
         ),

@@ -8,6 +8,9 @@ from ..core.conversion import Conversion
 from ..core.settings import ConversionSettings
 from .scene_needs import SceneNeeds
 
+ALL_LIGHT = 0.999
+"""Of all light, in lamps: the rest shows nowhere."""
+
 LEAST_SAID = 0.0005
 """Of all light: less of it that reaches nothing is not worth a sentence."""
 
@@ -62,6 +65,13 @@ def skipped_sentences(
             "instead of {own}."
         )
         lines.append((coarse if needs.mirrors else rough).format(width=width, own=own))
+    if not (conversion.settings.mirrors or conversion.account.share < ALL_LIGHT):
+        lines.append(
+            said(
+                "Skipped: nothing mirrors sharply, so all light is in lamps, which EEVEE shadows; "
+                "only the camera sees the world."
+            )
+        )
     shown = needs.width_for_camera(own)
     if not needs.camera_sees_world:
         lines.append(

@@ -17,7 +17,7 @@ from ..core.progress import Progress, silent
 from ..core.sampling import needs_light_tree
 from ..core.settings import ConversionSettings
 from ..core.visible import VisiblePart, visible_part
-from . import passes
+from . import eevee, passes
 from .controls import keep_factors
 from .driven import followed
 from .images import (
@@ -78,14 +78,18 @@ class SceneConversion:
         return headline(self.conversion)
 
 
-def settings_for(chosen: Mapping[str, Any]) -> ConversionSettings:
-    """The values of the panel, by the names of `properties.CHOICES`, as the core wants them."""
+def settings_for(chosen: Mapping[str, Any], engine: str) -> ConversionSettings:
+    """The values of the panel, by the names of `properties.CHOICES`, as the core wants them.
+
+    engine: of the scene, for the target that it chooses.
+    """
     options = {field.name for field in fields(SceneOptions)}
     values = {name: value for name, value in chosen.items() if name not in options}
     share = None if values.pop("share_auto") else float(values["share"])
     return ConversionSettings(
         **values
         | {
+            "target": eevee.target_for(values["target"], engine),
             "share": share,
             "lights": values["lights"] or None,
             "tolerance": values["tolerance"] or None,
@@ -225,11 +229,16 @@ def _replace(
         *skipped_sentences(conversion, settings, needs, tree_off),
         *_warnings(scene, (world, original), light, [*rig_of(rig.sky), *lamps]),
     ]
+    for_eevee = settings.in_eevee or "EEVEE" in scene.render.engine
+    if for_eevee:
+        sentences += eevee.losses(conversion.residual, light.gain)
     restore_scene(scene)
     name_images(new, conversion.environment.name)
     result = _install(scene, original, conversion, new, rig, lamps)
     if tree_off:
         scene.cycles.use_light_tree, state.light_tree_off = False, True
+    if for_eevee:
+        eevee.apply(scene, lamps)
     if options.two_passes:
         sentences += _add_pass(scene, conversion, found.other_lights)
     if options.light_groups:
@@ -241,7 +250,10 @@ def _replace(
 def _without_excess(
     settings: ConversionSettings, width: int, needs: SceneNeeds
 ) -> ConversionSettings:
-    """With a residual so wide that nothing could tell it from one as wide as the map."""
+    """With a residual so wide that nothing could tell it from one as wide as the map, and none for
+    mirrors where there are none."""
+    if settings.in_eevee:
+        settings = replace(settings, mirrors=needs.mirrors)
     if settings.residual_width is not None:
         return settings
     narrower = needs.residual_width(width)
@@ -344,6 +356,7 @@ def restore_scene(scene: bpy.types.Scene) -> None:
             scene.world = original
         _swap_overrides(scene, converted, original)
     passes.remove_suns_layer(scene)
+    eevee.take_back(scene)
     remove_groups(scene.view_layers)
     sky = state.sky
     state.original_world = state.converted_world = state.collection = state.sky = None

@@ -102,7 +102,8 @@ def _add_bright(group: argparse._ArgumentGroup) -> None:
         choices=get_args(Target),
         default=DEFAULTS.target,
         help="what the result is for: cycles (default) shows the rest with its shadows; eevee and "
-        "export light with it from everywhere, so that more of the map becomes suns",
+        "export light with it from everywhere, so that more of the map becomes suns; both is as "
+        "eevee, and chosen to be right in Cycles too",
     )
     group.add_argument(
         "--share",

@@ -19,6 +19,7 @@ from .patches import Patches
 from .shadow_edges import facing_up, half_widths
 from .sums import weighted_sum
 from .suns import Sun, disc_on_ground
+from .two_orders import irradiance_of_two_orders
 
 Floats = NDArray[np.float64]
 
@@ -118,7 +119,8 @@ class Prediction:
     irradiance: of each surface, luminance, (s,). mean: what surfaces get in the open from the
     whole map, on average over all that they may face. ground: what level ground gets in the open,
     as a part of the light that suns replace, of each channel; nan where a channel has none, (3,).
-    part: of all light that suns replace.
+    part: of all light that suns replace. of_residual: what the rest of the light is wrong by, where
+    it is shown without its shadows, as `error` counts: no suns mend that.
     """
 
     surfaces: Surfaces
@@ -126,28 +128,41 @@ class Prediction:
     mean: float
     ground: Floats
     part: float
+    of_residual: float = 0.0
 
     @classmethod
     def of(
-        cls, patches: Patches | None, all_light: float, unshadowed: Patches | None = None
+        cls,
+        patches: Patches | None,
+        all_light: float,
+        unshadowed: Patches | None = None,
+        two_orders: bool = False,
     ) -> Prediction:
         """patches: the light that suns shall replace. all_light: luminance of the whole map's
         scalar irradiance. unshadowed: a residual that is shown as if nothing stood before it; then
-        the suns are asked to make up for the shadows that it lacks."""
+        the suns are asked to make up for the shadows that it lacks. two_orders: it is shown as
+        EEVEE does (see `two_orders`)."""
         given = [some for some in (patches, unshadowed) if some is not None]
         surfaces = surfaces_for(given, all_light)
         wanted = np.zeros(SURFACES)
-        for some in given:
-            wanted += surfaces.of(some)
+        of_residual = 0.0
+        if patches is not None:
+            wanted += surfaces.of(patches)
         if unshadowed is not None:
-            wanted -= surfaces.in_the_open().of(unshadowed)
+            if two_orders:
+                shown = irradiance_of_two_orders(unshadowed, surfaces.normals)
+            else:
+                shown = surfaces.in_the_open().of(unshadowed)
+            lacking = surfaces.of(unshadowed) - shown
+            wanted += lacking
+            of_residual = float(np.sqrt(np.mean(lacking**2))) / (all_light / 4)
         ground, part = np.full(3, np.nan), 0.0
         if patches is not None:
             ground = _parts(
                 patches.flux, facing_up(patches.directions, half_widths(patches.spread))
             )
             part = float((patches.flux @ LUMINANCE_WEIGHTS).sum()) / all_light
-        return cls(surfaces, wanted, all_light / 4, ground, part)
+        return cls(surfaces, wanted, all_light / 4, ground, part, of_residual)
 
     def error(self, suns: Sequence[Sun]) -> float:
         """Root mean square of what surfaces get wrong under shadows if these suns stand in for

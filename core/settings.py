@@ -15,7 +15,7 @@ Frequency = Literal["one", "energy", "mean"]
 ResidualKind = Literal["map", "voronoi", "none"]
 ResidualWidth = int | Literal["own"] | None
 Fill = Literal["surroundings", "black"]
-Target = Literal["cycles", "eevee", "export"]
+Target = Literal["cycles", "eevee", "both", "export"]
 
 MOST = {"lights": 10_000, "samples": 50_000, "residual_samples": 20_000}
 """The largest numbers, for which every method is done in a minute or so on a map 1024 wide."""
@@ -28,8 +28,9 @@ side, eyes tell about so much apart."""
 OF_OWN_LIGHT = 0.05
 """And as a part of what the suns give: a few faint lights must not become one wide one."""
 
-MOST_BY_ITSELF = 256
-"""So many lights at most are chosen by themselves."""
+MOST_BY_ITSELF = {"cycles": 256, "eevee": 32, "both": 32, "export": 256}
+"""So many lights at most are chosen by themselves. In EEVEE each draws and searches a shadow map of
+its own, in every frame."""
 
 
 class BadSetting(SunsplitError):
@@ -42,11 +43,13 @@ class ConversionSettings:
 
     target: what the result is for. "cycles" shows the residual with its shadows; "eevee" and
         "export" (game engines) light with it from everywhere, so that more of the map becomes
-        suns, and what is predicted counts the shadows that the residual lacks.
+        suns, and what is predicted counts the shadows that the residual lacks. "both" is Cycles
+        and EEVEE with the same suns, so that the worse of the two is right.
     lights: at most so many suns, used up where they help, or None: as few as `tolerance` allows.
     tolerance: predicted error in percent of the mean irradiance (see `prediction`), at which no
         more lights are added; None: 1, and a twentieth of what the suns give, where `lights` is
-        None; nothing to stop at otherwise.
+        None; nothing to stop at otherwise. What a residual without shadows is wrong by, no number
+        of lights mends: where the program allows an error by itself, that comes on top.
     share: the part of all light in region A, 0 to 1, or None: chosen for the map.
         0 leaves the whole map in region B; 1 turns all of it into suns and leaves no residual.
     strata: how many strata of luminance, an even number; half of them make up region A.
@@ -64,6 +67,8 @@ class ConversionSettings:
     residual_width: pixels, a whole part of the map's width, "own" for all of them, or None: as
         many as light needs, about 1,024; mirrors and backgrounds may show that it is not sharp.
     residual_samples: how many samples a Voronoi map is made of.
+    mirrors: whether something may show the residual sharply. Where nothing does, suns in EEVEE may
+        hold all light, as what is left would be without shadows.
     fill: what the residual shows in region A: its "surroundings", with only what exceeds them
         given to suns, or "black" (the paper's), with all light given to them. None: surroundings
         with the method "edge", black with the others.
@@ -83,6 +88,7 @@ class ConversionSettings:
     residual: ResidualKind = "map"
     residual_width: ResidualWidth = None
     residual_samples: int = 500
+    mirrors: bool = True
     fill: Fill | None = None
 
     def __post_init__(self) -> None:
@@ -105,8 +111,13 @@ class ConversionSettings:
 
     @property
     def shadowed_residual(self) -> bool:
-        """Whether the target shows the residual with its shadows."""
+        """Whether the target shows the residual with its shadows, and nothing else does."""
         return self.target == "cycles"
+
+    @property
+    def in_eevee(self) -> bool:
+        """Whether EEVEE shows the result: the residual is a world, with light of two orders."""
+        return self.target in ("eevee", "both")
 
     @property
     def chooses_border(self) -> bool:
@@ -131,7 +142,7 @@ class ConversionSettings:
     @property
     def most_lights(self) -> int:
         """The number of lights that must not be exceeded."""
-        return MOST_BY_ITSELF if self.lights is None else self.lights
+        return MOST_BY_ITSELF[self.target] if self.lights is None else self.lights
 
     def allowed_error(self, share: float) -> float | None:
         """The tolerance in percent for suns with this share of all light, with None resolved; None

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 from hypothesis import strategies as st
 
 from sunsplit.core import ConversionSettings
+from sunsplit.core.settings import Target
 
 FAINTEST = 2.0**-149
 """The smallest float32 above 0, a denormal."""
@@ -86,7 +89,7 @@ def corpus() -> dict[str, np.ndarray]:
 
 
 EDGE = {
-    **{f"target {target}": {"target": target} for target in ("cycles", "eevee", "export")},
+    **{f"target {target}": {"target": target} for target in get_args(Target)},
     **{f"share {share}": {"share": share} for share in (0, 0.01, 0.5, 0.95, 1)},
     "one light": {"lights": 1},
     "points": {"shape": "point", "share": 0.5},
@@ -143,7 +146,7 @@ def extreme_maps(draw: st.DrawFn) -> np.ndarray:
 def any_choices(draw: st.DrawFn) -> ConversionSettings:
     """Any settings, with few lights."""
     return ConversionSettings(
-        target=draw(st.sampled_from(["cycles", "eevee", "export"])),
+        target=draw(st.sampled_from(get_args(Target))),
         lights=draw(st.integers(1, 8)),
         tolerance=draw(st.none() | st.floats(0.01, 10)),
         share=draw(st.none() | st.sampled_from([0, 0.01, 0.5, 0.95, 1]) | st.floats(0, 1)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import hypot
 
 import numpy as np
 
@@ -38,14 +39,19 @@ def choose_suns(
     """
     light = light.lit
     rest = patches_of(unshadowed, unshadowed.luminous_flux) if unshadowed else None
+    orders = settings.in_eevee
     if not len(light.pixels):
-        error = Prediction.of(None, strata.light, rest).error(()) if rest else 0.0
+        error = Prediction.of(None, strata.light, rest, orders).error(()) if rest else 0.0
         return ChosenSuns((), error, (NO_SUN,) if settings.share is None else (), 0.0)
     patches = _patches(light, strata, MOST_PATCHES)
     prediction = light.latest(
-        "prediction", (strata, rest), lambda: Prediction.of(patches, strata.light, rest)
+        "prediction",
+        (strata, rest, orders),
+        lambda: Prediction.of(patches, strata.light, rest, orders),
     )
     allowed = settings.allowed_error(float(light.luminous_flux.sum()) / strata.light)
+    if allowed is not None and settings.tolerance is None:
+        allowed = hypot(allowed, 100 * prediction.of_residual)
     if settings.method != "edge":
 
         def sampled(count: int) -> ChosenSuns:
@@ -60,7 +66,7 @@ def choose_suns(
         chosen = _judged(chosen, prediction, strata)
     else:
         chosen = _fewest_by_edge(light, strata, settings, prediction, allowed / 100)
-    notes = (*chosen.notes, *_count_note(chosen, light, settings, allowed))
+    notes = (*chosen.notes, *_count_note(chosen, light, settings, prediction, allowed))
     return replace(chosen, notes=notes)
 
 
@@ -76,7 +82,7 @@ def _fewest_by_edge(
     share = float(light.luminous_flux.sum()) / strata.light
 
     def expected(count: int) -> float:
-        return BALANCED * rough.error_of_cuts(count) * share
+        return hypot(BALANCED * rough.error_of_cuts(count) * share, prediction.of_residual)
 
     likely = first_guess(allowed, settings.most_lights, expected)
     # The same for all numbers, so that they share their cuts.
@@ -116,16 +122,22 @@ def _patches(light: RegionLight, strata: Strata, most: int) -> Patches:
 
 
 def _count_note(
-    chosen: ChosenSuns, light: RegionLight, settings: ConversionSettings, allowed: float | None
+    chosen: ChosenSuns,
+    light: RegionLight,
+    settings: ConversionSettings,
+    prediction: Prediction,
+    allowed: float | None,
 ) -> list[str]:
     """Why there are not as many lights as were asked for, or not as few errors."""
     made, asked = len(chosen.suns), settings.lights
     percent = 100 * chosen.worst
     if allowed is not None and percent > allowed:
         more = "" if asked else ": set the number of lights for more"
+        if 100 * prediction.of_residual > allowed:
+            more = ": the rest of the map is shown without shadows, and no lights mend that"
         return [
             f"{made} lights are predicted to be wrong by {percent:.2g} %, which is more than the "
-            f"{allowed:g} % allowed{more}."
+            f"{allowed:.3g} % allowed{more}."
         ]
     if asked is None or made == asked:
         return []

@@ -9,8 +9,13 @@ import numpy as np
 import pytest
 
 from sunsplit.core.files.maps import load
+from sunsplit.core.patches import patches_of
+from sunsplit.core.region import light_of_map
+from sunsplit.core.two_orders import irradiance_of_two_orders
 from tests.benchmarks import (
     conversion,
+    eevee,
+    eevee_report,
     equal_error,
     light_tree,
     lights,
@@ -109,6 +114,34 @@ def test_methods(tmp_path, sunrise):
     assert all(one.made == one.asked for one in runs if one.kind == "whole")
     lines = (tmp_path / "methods.md").read_text().splitlines()
     assert sum(line.startswith(("| whole", "| composite")) for line in lines) == len(runs)
+
+
+@pytest.mark.skipif(bool(eevee.without_eevee()), reason=eevee.without_eevee() or "it can")
+def test_eevee_shows_two_suns_as_cycles_does(tmp_path):
+    few = ["--analytic", "two opposite suns", "--samples", "2", "--reference", "128"]
+    (result,) = eevee.main([*few, "-o", str(tmp_path)])
+    assert result.wrong("converted") < 0.02
+    assert result.gain > 8
+    path = eevee.analytic_map(tmp_path, result.map)
+    # What is predicted of EEVEE's world is what EEVEE shows of it.
+    light = light_of_map(load(path).radiance)
+    patches = patches_of(light, light.luminous_flux)
+    predicted = irradiance_of_two_orders(patches, eevee_report.NORMALS) / np.pi
+    shown = result.images["zero"][0, :, :3].mean(axis=-1)
+    print(f"predicted {predicted}, shown {shown}")
+    assert shown == pytest.approx(predicted, rel=0.02)
+
+
+@pytest.mark.skipif(bool(eevee.without_eevee()), reason=eevee.without_eevee() or "it can")
+def test_eevee_shadows_a_real_map_as_cycles_does(tmp_path, sunrise):
+    few = ["--size", "32", "--samples", "2", "--reference", "128"]
+    (result,) = eevee.main([str(sunrise), *few, "-o", str(tmp_path)])
+    assert result.lamps <= 32
+    assert result.gain > 3
+    assert result.wrong("converted in cycles") < 2 * result.noise + 0.02
+    assert "| spruit_sunrise_1k |" in (tmp_path / "eevee.md").read_text()
+    for name in ("eevee.png", "eevee-pictures.png"):
+        assert (tmp_path / name).stat().st_size > 0
 
 
 def test_voronoi(tmp_path, monkeypatch):

@@ -36,7 +36,7 @@ def test_a_sky_without_suns_lacks_all_its_shadows_in_a_game(sunrise):
     assert convert(load(sunrise), ConversionSettings(share=0)).predicted_error == 0
 
 
-@pytest.mark.parametrize("target", ["cycles", "eevee", "export"])
+@pytest.mark.parametrize("target", ["cycles", "eevee", "both", "export"])
 @pytest.mark.parametrize("name", ["even", "one pixel", "one channel", "far apart", "random"])
 @pytest.mark.parametrize("lights", [None, 3])
 def test_odd_maps_for_every_target(target, name, lights):

@@ -2,7 +2,7 @@ import bpy
 
 settings = bpy.context.scene.sunsplit
 
-settings.target = "cycles"
+settings.target = "auto"
 settings.lights = 0
 settings.tolerance = 0.3
 settings.share_auto = True

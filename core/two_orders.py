@@ -1,0 +1,33 @@
+"""What EEVEE's world gives to surfaces: its light in spherical harmonics of order 0 and 1, from
+everywhere at once, whatever stands in the way."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .environment import LUMINANCE_WEIGHTS
+from .patches import Patches
+
+Floats = NDArray[np.float64]
+
+STEEPEST = np.sqrt(3) / 2
+"""The most that a surface's irradiance may differ from the mean, as a part of it: EEVEE lessens a
+stronger first order, so that surfaces turned away are not darker than black. Measured with one sun
+in a black sky, from any side: 0.867."""
+
+
+def irradiance_of_two_orders(patches: Patches, normals: Floats) -> Floats:
+    """Luminance of the irradiance of surfaces with these normals, (s, 3): (s,).
+
+    A cosine lobe has a quarter of all light in order 0, and half of it, times the cosine, in
+    order 1 (Ramamoorthi and Hanrahan, 2001).
+    """
+    flux = patches.flux @ LUMINANCE_WEIGHTS
+    mean = float(flux.sum()) / 4
+    # Patches spread too, so that their light is not all where it has its mean.
+    first = (flux * (1 - patches.spread)) @ patches.directions / 2
+    steep = float(np.linalg.norm(first))
+    if steep > STEEPEST * mean:
+        first *= STEEPEST * mean / steep
+    return mean + normals @ first
