@@ -51,10 +51,7 @@ class SUNSPLIT_OT_pick_sun(bpy.types.Operator):
 
 def draw_switch(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """A row for a panel: the overlay on and off."""
-    state = context.scene.sunsplit
-    row = layout.row()
-    row.active = state.is_converted
-    row.prop(state, "show_overlay", icon="OVERLAY")
+    layout.prop(context.scene.sunsplit, "show_overlay")
 
 
 def register() -> None:

@@ -13,6 +13,7 @@ from bl_ui.utils import PresetPanel
 
 from .controls import FACTORS, changed_factors, rotation_control
 from .jobs import Job
+from .overlay import draw_switch
 
 CHARACTER = 6.5
 """Width of a character of Blender's interface font in pixels at scale 1, on average and a bit."""
@@ -66,6 +67,7 @@ class _Suns:
         for factor in FACTORS:
             layout.prop(sky, f'["{factor.name}"]', text=factor.label, slider=True)
         _draw_state(layout, sky)
+        draw_switch(layout, context)
         if len(settings.lamps) > 1:
             row = layout.row(align=True)
             row.label(text="Select")
