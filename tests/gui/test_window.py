@@ -146,8 +146,8 @@ def test_without_a_world_the_button_is_grey(window: Window):
 
 def test_a_setting_is_changed_with_the_mouse(window: Window, quiet: None):
     window.unfold("SUNSPLIT_PT_settings")
-    window.press("sunsplit.share_auto")
-    window.wait_for("not bpy.context.scene.sunsplit.share_auto")
+    window.press("sunsplit.skips")
+    window.wait_for("not bpy.context.scene.sunsplit.skips")
 
 
 # What it costs
