@@ -1,6 +1,6 @@
 """What Sunsplit costs a Blender's window: a redraw of the panel, a start, a conversion.
 
-    .venv-5.2/bin/python -m tests.benchmarks.window [MAP.hdr ...] [-o FOLDER] [--repeats 5] ...
+    .venv-5.2/bin/python -m tests.benchmarks.window [MAP.hdr ...] [-o FOLDER] [--widths 4096] ...
 
 In the window of tests/gui, whose display is drawn by the processor: a redraw of all the window is
 slow there, so the gaps are printed beside those of orbiting the view, where Sunsplit has no part.
@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import argparse
 import shutil
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
+from tests.benchmarks.large_maps import Kind, make
 from tests.gui.debian import debian
 from tests.gui.session import SUNRISE, session
 from tests.gui.window import Window
@@ -41,14 +43,13 @@ def measure(window: Window, maps: Sequence[Path], redraws: int, repeats: int) ->
     results.append(Result("panel, a redraw after converting", redrawn(window, redraws), REDRAW))
     window.ask("open_scene('scene.blend')")
     starts = [window.ask("timed_start()") for _ in range(repeats)]
-    results.append(Result("import", [one[0] for one in starts]))
-    results.append(Result("register", [one[1] for one in starts], REGISTER))
+    results.append(Result("import and register", starts, REGISTER))
     results.append(Result("gap, nothing done", gaps(window, lambda: time.sleep(1), repeats)))
     results.append(Result("gap, orbiting the view", gaps(window, lambda: orbit(window), repeats)))
     for path in maps:
         shutil.copy2(path, window.folder / path.name)
         found = [conversion_gap(window, path.name) for _ in range(repeats)]
-        results.append(Result(f"gap, converting {path.stem}", found, GAP))
+        results.append(Result(f"gap, converting {path.name}", found, GAP))
     window.ask("open_scene('scene.blend')")
     return results
 
@@ -61,6 +62,16 @@ def redrawn(window: Window, redraws: int) -> list[float]:
         if drawn := window.ask("redraw()"):  # else the redraw is still to come
             found.append(sum(drawn.values()))
     return found
+
+
+def widened(maps: Sequence[Path], widths: Sequence[int], folder: Path) -> list[Path]:
+    """The maps, linear between their pixels, in each of the widths."""
+    made = []
+    for path in maps:
+        for width in widths:
+            made.append(folder / f"{path.stem}_{width}.exr")
+            make(path, width, Kind("exr", "float", "zip"), made[-1], grain=0)
+    return made
 
 
 def press_and_wait(window: Window) -> None:
@@ -89,7 +100,7 @@ def orbit(window: Window) -> None:
 def conversion_gap(window: Window, name: str) -> float:
     """The longest gap from the click to the scene with its lamps, drawn."""
     window.ask("open_scene('scene.blend')")
-    window.ask(f"light_by({name!r})")
+    window.ask(f"[light_by({name!r}), forget()]")
     x, y = window.find("sunsplit.convert")
     window.settle()
     (gap,) = gaps(window, lambda: (window.click(x, y), window.wait_for("is_converted()", 600)), 1)
@@ -115,11 +126,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("maps", nargs="*", type=Path, default=[SUNRISE], metavar="MAP.hdr")
     parser.add_argument("-o", "--output", type=Path, default=Path("out"), metavar="FOLDER")
+    parser.add_argument("--widths", nargs="*", type=int, default=[], help="also as wide as this")
     parser.add_argument("--redraws", type=int, default=100)
     parser.add_argument("--repeats", type=int, default=5)
     chosen = parser.parse_args(arguments)
-    with session(debian()) as window:
-        results = measure(window, chosen.maps, chosen.redraws, chosen.repeats)
+    with session(debian()) as window, tempfile.TemporaryDirectory() as folder:
+        maps = [*chosen.maps, *widened(chosen.maps, chosen.widths, Path(folder))]
+        results = measure(window, maps, chosen.redraws, chosen.repeats)
         text = table(results, window.ask("bpy.app.version_string"))
     chosen.output.mkdir(parents=True, exist_ok=True)
     (chosen.output / "window.md").write_text(text, encoding="utf-8")

@@ -94,18 +94,24 @@ def enable(on: bool = True) -> None:
     operator(module=MODULE)
 
 
-def timed_start() -> list[float]:
-    """Milliseconds to import the extension and to register it, as a start of Blender does."""
+def timed_start() -> float:
+    """Milliseconds to import and register the extension, as each start of Blender does."""
     sys.modules[MODULE].unregister()
     for name in [name for name in sys.modules if f"{name}.".startswith(f"{MODULE}.")]:
         del sys.modules[name]
     began = time.perf_counter()
     module = importlib.import_module(MODULE)
-    imported = time.perf_counter()
     module.register()
-    registered = time.perf_counter()
+    spent = 1e3 * (time.perf_counter() - began)
     module.__addon_enabled__ = True  # or Blender would not unregister it
-    return [1e3 * (imported - began), 1e3 * (registered - imported)]
+    return spent
+
+
+def forget() -> None:
+    """Have the next conversion begin with reading its map."""
+    known = sys.modules.get(f"{MODULE}.addon.known")
+    if known is not None:
+        known.forget()
 
 
 # The scene

@@ -34,7 +34,7 @@ WIDTH, HEIGHT = 1280, 900
 
 INSIDE = Path(__file__).parent / "inside.py"
 
-STEP = 9
+STEP = 15
 """Pixels from one try to the next where a button is looked for: a button is 20 high."""
 
 
@@ -209,7 +209,11 @@ class Window:
             self.settle()
             if self.ask("hovered()"):
                 continue
+            seen = self._sidebar()
             self._do("click", 1)
+            self.settle()
+            if self._sidebar() == seen:  # no header
+                continue
             after = self._drawn()
             if panel in after:
                 return
@@ -218,11 +222,28 @@ class Window:
                 before = self._drawn()
         raise NotSeen(f"No header of {panel} in the sidebar.")
 
-    def _rows(self) -> list[tuple[int, int]]:
-        """Points down the sidebar, where buttons are that are half as wide as it or wider."""
+    def _rows(self) -> Iterator[tuple[int, int]]:
+        """Points down the sidebar, where buttons are that are half as wide as it or wider.
+
+        First those in sight, then all there are: the sidebar is turned by the wheel.
+        """
         left, top, width, height = self.ask("place('UI')")
         x = left + round(0.6 * (width - TABS))
-        return [(x, y) for y in range(top + STEP, top + height, STEP)]
+        rows = [(x, y) for y in range(top + STEP, top + height, STEP)]
+        yield from rows
+        middle = (x, top + height // 2)
+        seen, turned = None, self._turned(middle, up=True)
+        while seen != turned:
+            yield from rows
+            seen, turned = turned, self._turned(middle, up=False)
+
+    def _turned(self, middle: tuple[int, int], up: bool) -> Image.Image:
+        """Turn the sidebar to its top, or a little down; what is seen then."""
+        self.move(*middle)
+        self.settle()
+        self._do("click", "--repeat", 50 if up else 5, "--delay", 10, 4 if up else 5)
+        self.settle()
+        return self._sidebar()
 
     def _drawn(self) -> set[str]:
         """The panels that are not folded."""
@@ -246,13 +267,20 @@ class Window:
 
     def panel_picture(self) -> Image.Image:
         """The sidebar without its tabs, as far down as there is something in it."""
-        left, top, width, height = self.ask("place('UI')")
-        sidebar = self.picture().crop((left, top, left + width - TABS, top + height))
+        self.picture()
+        sidebar = self._sidebar()
+        width, height = sidebar.size
         empty = Image.new("RGB", sidebar.size, sidebar.getpixel((width // 2, height - 3)))
-        box = ImageChops.difference(sidebar.convert("RGB"), empty).getbbox()
+        box = ImageChops.difference(sidebar, empty).getbbox()
         if box is None:
             raise NotSeen("The sidebar is empty.")
-        return sidebar.crop((0, 0, sidebar.width, min(box[3] + MARGIN, height)))
+        return sidebar.crop((0, 0, width, min(box[3] + MARGIN, height)))
+
+    def _sidebar(self) -> Image.Image:
+        """What the sidebar shows, but its tabs."""
+        left, top, width, height = self.ask("place('UI')")
+        box = (left, top, left + width - TABS, top + height)
+        return ImageGrab.grab(box, xdisplay=self.display).convert("RGB")
 
 
 @contextmanager
