@@ -10,10 +10,12 @@ from mathutils import Matrix
 from sunsplit.addon import eevee
 from tests.blender import (
     add_mesh,
+    ball_mesh,
     box_mesh,
     diffuse,
     fresh_scene,
     hdri_world,
+    material,
     node,
     suns,
     write_map,
@@ -113,6 +115,20 @@ def test_an_empty_scene_is_set_up_too(scene):
     bpy.data.objects.remove(bpy.data.objects["Box"])
     bpy.ops.sunsplit.convert(target="eevee")
     assert all(lamp.data.shadow_maximum_resolution > 0 for lamp in suns(scene))
+
+
+def test_all_light_is_in_lamps_unless_something_mirrors(scene, sunrise):
+    hdri_world(scene, sunrise)
+    bpy.ops.sunsplit.convert(target="eevee")
+    assert "100.0% of all light" in scene.sunsplit.report
+    assert "nothing mirrors sharply, so all light is in lamps" in scene.sunsplit.report
+    mirror = material("Mirror", (0.9, 0.9, 0.9), Metallic=1, Roughness=0.0)
+    add_mesh(scene, ball_mesh(1), mirror, Matrix())
+    bpy.ops.sunsplit.convert(target="eevee")
+    assert "100.0% of all light" not in scene.sunsplit.report
+    assert "all light is in lamps" not in scene.sunsplit.report
+    bpy.ops.sunsplit.convert(target="eevee", skips=False)
+    assert "all light is in lamps" not in scene.sunsplit.report
 
 
 def test_what_eevee_would_cut_off_is_said(scene, sunrise):

@@ -71,6 +71,9 @@ def test_eevee_keeps_a_world_for_mirrors(sunrise):
     conversion = convert(load(sunrise), ConversionSettings(target="eevee", lights=64))
     assert conversion.residual is not None
     assert conversion.residual.max() > 0
+    none = convert(load(sunrise), ConversionSettings(target="eevee", lights=64, mirrors=False))
+    assert none.account.share == pytest.approx(1)
+    assert none.predicted_error < conversion.predicted_error
 
 
 def glittering() -> np.ndarray:
