@@ -74,8 +74,11 @@ def test_a_sun_below_the_ground_is_no_lamp_and_stays_in_the_world(scene):
 
 def test_eevee_whose_world_shines_through_the_ground_gets_both_lamps(scene):
     scene.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
-    bpy.ops.sunsplit.convert()
+    bpy.ops.sunsplit.convert(target="cycles")
     assert heights(scene) == pytest.approx([BELOW[2], ABOVE[2]], abs=1e-3)
+    bpy.ops.sunsplit.convert(target="auto")  # and the sky as well
+    lamps = [to_light(lamp) for lamp in suns(scene)]
+    assert all(max(lamp @ sun for lamp in lamps) > 0.9999 for sun in (ABOVE, BELOW))
 
 
 def test_what_is_visible_turns_with_the_world(scene):
