@@ -33,7 +33,8 @@ class SUNSPLIT_OT_convert(InSteps, bpy.types.Operator):
         return _is_editable(cls, context)
 
     def work(self, context: bpy.types.Context) -> Steps[SceneConversion]:
-        from .scene import conversion_steps, options_for, settings_for
+        from .options import options_for, settings_for
+        from .scene import conversion_steps
 
         scene, chosen = context.scene, self._chosen(context.scene.sunsplit)
         settings = settings_for(chosen, scene.render.engine)
@@ -77,7 +78,7 @@ class SUNSPLIT_OT_restore(bpy.types.Operator):
         return _is_converted(cls, context) and _is_editable(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        from .scene import restore_scene
+        from .restoring import restore_scene
 
         restore_scene(context.scene)
         return {"FINISHED"}

@@ -1,10 +1,9 @@
-"""Convert the world of a scene and take it back: what the operators call."""
+"""Convert the world of a scene: what the operators call."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import bpy
 
@@ -30,11 +29,13 @@ from .images import (
     write_map,
 )
 from .known import known_conversion
-from .lamps import link_lamps, make_lamps, name_lamps, remove_lamps, unlink_lamps
-from .light_groups import put_into_groups, remove_groups
+from .lamps import link_lamps, make_lamps, name_lamps
+from .light_groups import put_into_groups
+from .options import SceneOptions
 from .rays import Reach
 from .report import headline, made_sentences, skipped_sentences
-from .rig import Rig, make_rig, remove_rig, rig_of
+from .restoring import restore_scene, swap_overrides
+from .rig import Rig, make_rig, rig_of
 from .scene_needs import ALL, SceneNeeds, needs_of
 from .steps import Apart, Steps, run_at_once
 from .trace import TAG
@@ -44,25 +45,10 @@ from .world import (
     find_light,
     is_animated,
     name_images,
-    remove_converted,
-    unconverted,
 )
 
 MADE = 0.9
 """Of the time of a conversion, about, until its maps are written."""
-
-
-@dataclass(frozen=True)
-class SceneOptions:
-    """What a scene may choose besides what becomes of its map.
-
-    skips: what the scene does not need, as it is now, is left out. two_passes, light_groups: see
-    the modules of these names.
-    """
-
-    skips: bool = True
-    two_passes: bool = False
-    light_groups: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,43 +64,14 @@ class SceneConversion:
         return headline(self.conversion)
 
 
-def settings_for(chosen: Mapping[str, Any], engine: str) -> ConversionSettings:
-    """The values of the panel, by the names of `properties.CHOICES`, as the core wants them.
-
-    engine: of the scene, for the target that it chooses.
-    """
-    options = {field.name for field in fields(SceneOptions)}
-    values = {name: value for name, value in chosen.items() if name not in options}
-    share = None if values.pop("share_auto") else float(values["share"])
-    return ConversionSettings(
-        **values
-        | {
-            "target": eevee.target_for(values["target"], engine),
-            "share": share,
-            "lights": values["lights"] or None,
-            "tolerance": values["tolerance"] or None,
-            # The slider can stop at an odd number; the next even one is meant.
-            "strata": values["strata"] + values["strata"] % 2,
-            "samples": values["samples"] or None,
-            "residual_width": values["residual_width"] or None,
-            "fill": None if values["fill"] == "auto" else values["fill"],
-        }
-    )
-
-
-def options_for(chosen: Mapping[str, Any]) -> SceneOptions:
-    """The rest of what `settings_for` takes."""
-    return SceneOptions(**{field.name: bool(chosen[field.name]) for field in fields(SceneOptions)})
-
-
 def convert_scene(
     scene: bpy.types.Scene,
     settings: ConversionSettings,
-    options: SceneOptions = SceneOptions(),
+    options: SceneOptions | None = None,
     progress: Progress = silent,
 ) -> SceneConversion:
     """Replace a scene's world and add lamps, all at once: see `conversion_steps`."""
-    return run_at_once(conversion_steps(scene, settings, options), progress)
+    return run_at_once(conversion_steps(scene, settings, options or SceneOptions()), progress)
 
 
 def conversion_steps(
@@ -301,21 +258,12 @@ def _install(
     world.name = f"{original.name} (Sunsplit)"
     state.original_world, state.converted_world = original, world
     scene.world = world
-    _swap_overrides(scene, original, world)
+    swap_overrides(scene, original, world)
     for lamp in lamps:
         state.lamps.add().lamp = lamp
     name_lamps(conversion.suns, lamps, rig, conversion.account.source @ LUMINANCE_WEIGHTS)
     state.sky, state.collection = rig.sky, link_lamps(scene, rig, lamps)
     return SceneConversion(conversion, world, state.collection)
-
-
-def _swap_overrides(
-    scene: bpy.types.Scene, old: bpy.types.World, new: bpy.types.World | None
-) -> None:
-    """View layers that override the world with the same world follow it."""
-    for layer in scene.view_layers:
-        if layer.world_override == old:
-            layer.world_override = new
 
 
 def _warnings(
@@ -338,36 +286,3 @@ def _warnings(
                 "there, the lamps are added to that world's light."
             )
     return lines
-
-
-def restore_scene(scene: bpy.types.Scene) -> None:
-    """Bring back the original world and remove all that the conversion made.
-
-    A world that the user has chosen meanwhile stays. What another scene uses too stays there.
-    """
-    state = scene.sunsplit
-    converted, collection = state.converted_world, state.collection
-    original = state.original_world
-    lamps = [entry.lamp for entry in state.lamps if entry.lamp]
-    if original is None and converted is not None:
-        original = unconverted(converted)
-    if converted is not None:
-        if scene.world == converted:
-            scene.world = original
-        _swap_overrides(scene, converted, original)
-    passes.remove_suns_layer(scene)
-    eevee.take_back(scene)
-    remove_groups(scene.view_layers)
-    sky = state.sky
-    state.original_world = state.converted_world = state.collection = state.sky = None
-    state.lamps.clear()
-    state.report = state.outlines = ""
-    if state.light_tree_off and hasattr(scene, "cycles"):
-        scene.cycles.use_light_tree = True
-    state.light_tree_off = False
-    made = [*lamps, *rig_of(sky)]
-    unlink_lamps(scene, collection, made)
-    remove_rig(sky, lamps)
-    remove_lamps(lamps)
-    if converted is not None and converted != original:
-        remove_converted(converted)

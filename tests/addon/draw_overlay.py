@@ -10,11 +10,11 @@ import gpu
 import numpy as np
 from mathutils import Matrix
 
-from sunsplit.addon.overlay_draw import Drawing
-from sunsplit.addon.overlay_layers import sun_layers, words
-from sunsplit.addon.overlay_marks import discs_in_map, marks_in_map
-from sunsplit.addon.overlay_screen import Frame
-from sunsplit.addon.overlay_suns import ShownSuns
+from sunsplit.addon.overlay.draw import Drawing
+from sunsplit.addon.overlay.layers import sun_layers, words
+from sunsplit.addon.overlay.marks import discs_in_map, marks_in_map
+from sunsplit.addon.overlay.screen import Frame
+from sunsplit.addon.overlay.suns import ShownSuns
 
 WIDTH, HEIGHT = 400, 300
 

@@ -11,7 +11,9 @@ import pytest
 
 from sunsplit.addon import known
 from sunsplit.addon.jobs import AT_A_TIME, Job
-from sunsplit.addon.scene import SceneOptions, conversion_steps, convert_scene, restore_scene
+from sunsplit.addon.options import SceneOptions
+from sunsplit.addon.restoring import restore_scene
+from sunsplit.addon.scene import conversion_steps, convert_scene
 from sunsplit.addon.steps import Apart, run_at_once
 from sunsplit.core import ConversionSettings
 from sunsplit.core.errors import SunsplitError, UnusableInput

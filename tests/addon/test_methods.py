@@ -78,7 +78,7 @@ def test_a_thousand_lamps_come_and_go(scene):
 def test_every_setting_of_the_core_is_a_choice_with_the_same_default(scene):
     from dataclasses import asdict
 
-    from sunsplit.addon.scene import settings_for
+    from sunsplit.addon.options import settings_for
 
     own = {name: getattr(scene.sunsplit, name) for name in CHOICES}
     assert settings_for(own, "CYCLES") == ConversionSettings()

@@ -12,10 +12,10 @@ import pytest
 from mathutils import Vector
 
 from sunsplit.addon import overlay
-from sunsplit.addon.overlay_draw import Kept
-from sunsplit.addon.overlay_image import border_layers, light_shown
-from sunsplit.addon.overlay_suns import lit_place, on_screen, shown_suns
-from sunsplit.addon.pick import select, selects
+from sunsplit.addon.overlay.draw import Kept
+from sunsplit.addon.overlay.image import border_layers, light_shown
+from sunsplit.addon.overlay.pick import select, selects
+from sunsplit.addon.overlay.suns import lit_place, on_screen, shown_suns
 from sunsplit.core import ConversionSettings, convert, load, sphere
 from sunsplit.core.outlines import Outlines, outlines_of
 from tests.blender import add_mapping, fresh_scene, hdri_world, plate_mesh, write_map
@@ -257,7 +257,7 @@ def test_a_drawing_is_made_again_only_after_a_change():
 def test_registering_loads_nothing_that_draws():
     code = (
         "import sys, bpy, sunsplit; sunsplit.register();"
-        "loaded = [m for m in sys.modules if m.startswith('sunsplit.addon.overlay_')];"
+        "loaded = [m for m in sys.modules if m.startswith('sunsplit.addon.overlay.')];"
         "print('loaded', loaded, 'gpu_extras' in sys.modules, 'scipy' in sys.modules);"
         "sunsplit.unregister()"
     )

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 from mathutils import Matrix, Vector
 
-from sunsplit.addon.overlay_marks import (
+from sunsplit.addon.overlay.marks import (
     AROUND,
     Marks,
     circles,
@@ -17,7 +17,7 @@ from sunsplit.addon.overlay_marks import (
     marks_in_map,
     marks_in_view,
 )
-from sunsplit.addon.overlay_screen import (
+from sunsplit.addon.overlay.screen import (
     Frame,
     View,
     arrow_head,

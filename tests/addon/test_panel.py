@@ -8,8 +8,8 @@ import bpy
 import pytest
 
 from sunsplit.addon import panel, presets
+from sunsplit.addon.options import settings_for
 from sunsplit.addon.properties import CHOICES
-from sunsplit.addon.scene import settings_for
 from tests.blender import fresh_scene, hdri_world, suns, write_map
 from tests.maps import direction, paint_disc, sky
 

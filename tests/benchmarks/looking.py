@@ -23,8 +23,10 @@ from mathutils import Matrix
 
 from sunsplit.addon import known
 from sunsplit.addon.images import read_image
+from sunsplit.addon.options import SceneOptions
 from sunsplit.addon.rays import Reach
-from sunsplit.addon.scene import SceneOptions, convert_scene, restore_scene
+from sunsplit.addon.restoring import restore_scene
+from sunsplit.addon.scene import convert_scene
 from sunsplit.addon.scene_needs import needs_of
 from sunsplit.addon.steps import run_at_once
 from sunsplit.addon.world import WorldLight, find_light

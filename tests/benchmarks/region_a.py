@@ -21,7 +21,8 @@ import numpy as np
 from mathutils import Matrix
 
 from sunsplit.addon.images import read_image
-from sunsplit.addon.scene import SceneOptions, convert_scene
+from sunsplit.addon.options import SceneOptions
+from sunsplit.addon.scene import convert_scene
 from sunsplit.addon.steps import run_at_once
 from sunsplit.addon.world import find_light
 from sunsplit.core.environment import luminance

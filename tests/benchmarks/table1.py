@@ -193,7 +193,8 @@ def progress(things: Iterable[T], name: str) -> Iterable[T]:
 
 def prepare(scene: bpy.types.Scene, settings: ConversionSettings | None, path: Path) -> Prepared:
     """Convert a scene through the add-on, unless settings are None, and save it."""
-    from sunsplit.addon.scene import SceneOptions, convert_scene
+    from sunsplit.addon.options import SceneOptions
+    from sunsplit.addon.scene import convert_scene
 
     facts = {}
     if settings is not None:

@@ -19,7 +19,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from sunsplit.addon.scene import SceneOptions, convert_scene
+from sunsplit.addon.options import SceneOptions
+from sunsplit.addon.scene import convert_scene
 from sunsplit.addon.world import black_world
 from sunsplit.core.passes import PassPart, parts_of
 from sunsplit.core.settings import ConversionSettings

@@ -341,8 +341,8 @@ def overlay_times(kind: str, changed: bool, times: int) -> list[float]:
 
     changed: as if the view had moved since the redraw before.
     """
-    view_module = importlib.import_module(f"{MODULE}.addon.overlay_view")
-    image_module = importlib.import_module(f"{MODULE}.addon.overlay_image")
+    view_module = importlib.import_module(f"{MODULE}.addon.overlay.view")
+    image_module = importlib.import_module(f"{MODULE}.addon.overlay.image")
     area = next(area for area in window().screen.areas if area.type == kind)
     inner = next(one for one in area.regions if one.type == "WINDOW")
     of_kind = {"VIEW_3D": view_module.drawing_of, "IMAGE_EDITOR": image_module.drawings_of}

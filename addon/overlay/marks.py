@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import sphere
-from ..core.outlines import lines_in_image
-from .overlay_screen import IN_FRONT, View, distances, globe
+from ...core import sphere
+from ...core.outlines import lines_in_image
+from .screen import IN_FRONT, View, distances, globe
 
 Floats = NDArray[np.float64]
 

@@ -6,11 +6,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from .overlay_draw import Drawing, Kept, Lines
-from .overlay_layers import LETTERS, RING, arrow_layers, ray_layers, sun_layers, words
-from .overlay_marks import Marks, circles, marks_in_view
-from .overlay_screen import Frame, View, globe, ray_in_view
-from .overlay_suns import ShownSuns, lit_place, shown_suns
+from .draw import Drawing, Kept, Lines
+from .layers import LETTERS, RING, arrow_layers, ray_layers, sun_layers, words
+from .marks import Marks, circles, marks_in_view
+from .screen import Frame, View, globe, ray_in_view
+from .suns import ShownSuns, lit_place, shown_suns
 
 Floats = NDArray[np.float64]
 

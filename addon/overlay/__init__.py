@@ -75,21 +75,21 @@ def unregister() -> None:
         keymap.keymap_items.remove(item)
     _handlers.clear()
     _keys.clear()
-    for name in ("overlay_view", "overlay_image"):
-        used = sys.modules.get(f"{__package__}.{name}")
+    for name in ("view", "image"):
+        used = sys.modules.get(f"{__name__}.{name}")
         if used is not None:
             used.forget()
 
 
 def _draw_view() -> None:
     if bpy.context.scene.sunsplit.is_converted:
-        from .overlay_view import draw_view
+        from .view import draw_view
 
         draw_view()
 
 
 def _draw_image() -> None:
     if bpy.context.scene.sunsplit.is_converted:
-        from .overlay_image import draw_image
+        from .image import draw_image
 
         draw_image()

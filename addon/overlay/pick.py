@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from .overlay_marks import Marks
-from .overlay_suns import ShownSuns
-from .overlay_view import is_shown
+from .marks import Marks
+from .suns import ShownSuns
+from .view import is_shown
 
 REACH = 10.0
 """Pixels at scale 1 that a click may be off a sun's outline or centre."""
@@ -61,10 +61,10 @@ def select(layer: bpy.types.ViewLayer, lamp: bpy.types.Object, extend: bool) -> 
 def suns_on_screen(context: bpy.types.Context) -> tuple[ShownSuns, Marks] | None:
     """Suns and where they are in the editor of a context; None where it shows none."""
     if context.space_data.type == "IMAGE_EDITOR":
-        from .overlay_image import seen_map
+        from .image import seen_map
 
         seen = seen_map(context)
         return (seen.suns, seen.marks()) if seen else None
-    from .overlay_view import seen_suns
+    from .view import seen_suns
 
     return seen_suns(context)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .overlay_draw import Areas, Colour, Lines, Word, sizes_of
-from .overlay_marks import Marks
-from .overlay_screen import Frame, arrow_head, place_labels
-from .overlay_suns import ShownSuns, label_of
+from .draw import Areas, Colour, Lines, Word, sizes_of
+from .marks import Marks
+from .screen import Frame, arrow_head, place_labels
+from .suns import ShownSuns, label_of
 
 Floats = NDArray[np.float64]
 

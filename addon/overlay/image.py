@@ -9,14 +9,14 @@ import gpu
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.errors import UnusableInput
-from ..core.outlines import Outlines
-from .overlay_draw import Colour, Drawing, Kept, Lines
-from .overlay_layers import LETTERS, RING, sun_layers, words
-from .overlay_marks import MapDiscs, Marks, discs_in_map, marks_in_map
-from .overlay_suns import ShownSuns, shown_suns
-from .overlay_view import free_frame, halo_of, is_shown
-from .world import WorldLight, find_light
+from ...core.errors import UnusableInput
+from ...core.outlines import Outlines
+from ..world import WorldLight, find_light
+from .draw import Colour, Drawing, Kept, Lines
+from .layers import LETTERS, RING, sun_layers, words
+from .marks import MapDiscs, Marks, discs_in_map, marks_in_map
+from .suns import ShownSuns, shown_suns
+from .view import free_frame, halo_of, is_shown
 
 Floats = NDArray[np.float64]
 
