@@ -311,7 +311,7 @@ def suns_seen(kind: str = "VIEW_3D") -> list[list]:
     area = next(area for area in window().screen.areas if area.type == kind)
     inner = next(one for one in area.regions if one.type == "WINDOW")
     with bpy.context.temp_override(window=window(), area=area, region=inner):
-        pick = importlib.import_module(f"{MODULE}.addon.pick")
+        pick = importlib.import_module(f"{MODULE}.addon.overlay.pick")
         suns, marks = pick.suns_on_screen(bpy.context)
     rows = window().height - 1 - inner.y
     places = marks.place[~marks.aside].round().astype(int).tolist()
