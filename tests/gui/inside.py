@@ -240,6 +240,19 @@ def place(kind: str) -> list[int]:
     return [one.x, window().height - one.y - one.height, one.width, one.height]
 
 
+def face_the_brightest() -> None:
+    """Look from the ground at the sun that gives most light, as Cycles renders it."""
+    sun = bpy.context.scene.sunsplit.lamps[0].lamp
+    to_light = sun.matrix_world.col[2].xyz
+    space = view().spaces.active
+    eye = space.region_3d
+    eye.view_perspective, eye.view_distance = "PERSP", 7.5
+    eye.view_location = 0.2, 0.0, 1.3
+    to_light.z = 0.02
+    eye.view_rotation = (-to_light).to_track_quat("Z", "Y")
+    space.shading.type = "RENDERED"
+
+
 def category() -> str:
     """The sidebar's tab; empty where it has none or is closed."""
     return region("UI").active_panel_category if view().spaces.active.show_region_ui else ""
