@@ -69,8 +69,8 @@ class _Suns:
         _draw_state(layout, sky)
         draw_switch(layout, context)
         if len(settings.lamps) > 1:
+            layout.label(text="Select Suns")
             row = layout.row(align=True)
-            row.label(text="Select")
             for which in ("all", "brightest", "sharp", "soft"):
                 operator = row.operator("sunsplit.select_suns", text=which.title())
                 operator.which = which
@@ -184,8 +184,10 @@ def _characters(context: bpy.types.Context) -> int:
 def draw_settings(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     """What most users may want to choose."""
     layout.prop(settings, "target")
-    layout.prop(settings, "lights")
-    layout.prop(settings, "tolerance")
+    # 0 is a number like any other to who has not read the tooltip.
+    layout.prop(settings, "lights", text="Lights" if settings.lights else "Lights (auto)")
+    automatic = not settings.tolerance and not settings.lights
+    layout.prop(settings, "tolerance", text="Tolerance (auto)" if automatic else "Tolerance")
     layout.prop(settings, "skips")
 
 

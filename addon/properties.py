@@ -190,7 +190,7 @@ CHOICES = {
         soft_max=4096,
     ),
     "skips": BoolProperty(
-        name="Skip What Is Not Needed",
+        name="Skip the Unneeded",
         description="Leave out what this scene, as it is now, cannot show: lamps for light that "
         "reaches nothing the camera sees, an HDRI that it does not see or is wider than its "
         "picture, details that nothing mirrors, Cycles' light tree",
