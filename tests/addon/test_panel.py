@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 import pytest
 
+from sunsplit import addon
 from sunsplit.addon import panel, presets
 from sunsplit.addon.options import settings_for
 from sunsplit.addon.properties import CHOICES
@@ -86,3 +87,18 @@ def test_what_operators_need_is_said(scene, three_suns):
     for name in ("select_suns", "reset_factors", "restore"):
         with pytest.raises(RuntimeError, match=r"not converted|convert the world first"):
             getattr(bpy.ops.sunsplit, name)()
+
+
+def test_everything_has_a_tooltip(scene):
+    for cls in addon.CLASSES:
+        if issubclass(cls, bpy.types.Operator):
+            name = cls.bl_idname.removeprefix("sunsplit.")
+            assert getattr(bpy.ops.sunsplit, name).get_rna_type().description, name
+    kinds = scene.sunsplit.bl_rna, bpy.ops.sunsplit.select_suns.get_rna_type()
+    for kind in kinds:
+        for known in kind.properties:
+            shown = not known.is_readonly and known.identifier not in ("rna_type", "name", "lamps")
+            if shown and known.type != "POINTER":
+                assert known.description, known.identifier
+                items = known.enum_items if known.type == "ENUM" else ()
+                assert all(item.description for item in items), known.identifier
