@@ -29,8 +29,11 @@ lamp's disc is all traced, and its penumbrae hide the texels."""
 FINEST, COARSEST = 0.001, 0.1
 """Metres of a texel: Blender's default, and where shadows would begin too far from their things."""
 
-WIDE = np.radians(3)
-"""Lamps up to this width need no jitter: what is before them is found well enough in one map."""
+JITTERED = np.radians(3), np.radians(60)
+"""Widths of lamps that jitter makes truer. What is before narrower ones is found well enough in one
+map. Of wider ones much is below the horizons of surfaces, which then lie in their own shadow in a
+part of the samples, though EEVEE has left that part of the lamp out already: white plates under an
+even sky of two such lamps were a seventh too dark."""
 
 OVERBLUR = 10.0
 """Percent of a disc that is traced around each place on it: Blender's default."""
@@ -99,7 +102,7 @@ def _set_shadow(lamp: bpy.types.Light, width: float) -> None:
     lamp.shadow_maximum_resolution = float(np.clip(texel, FINEST, COARSEST))
     lamp.shadow_filter_radius = 1.0
     # In renders, not in viewports: the map is drawn again for each sample, from anew on the disc.
-    lamp.use_shadow_jitter = bool(lamp.angle > WIDE)
+    lamp.use_shadow_jitter = bool(JITTERED[0] < lamp.angle < JITTERED[1])
     lamp.shadow_jitter_overblur = OVERBLUR
 
 
