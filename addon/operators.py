@@ -115,6 +115,7 @@ class SUNSPLIT_OT_select_suns(bpy.types.Operator):
     __annotations__ = {
         "which": EnumProperty(
             name="Which",
+            description="By how much light they give, or how wide they are",
             items=[
                 ("all", "All", "All suns"),
                 ("brightest", "Brightest", "The one that gives most light"),
