@@ -19,7 +19,7 @@ from .patches import Patches
 from .shadow_edges import facing_up, half_widths
 from .sums import weighted_sum
 from .suns import Sun, disc_on_ground
-from .two_orders import irradiance_of_two_orders
+from .two_orders import WIDEST_SHADOWED, irradiance_of_two_orders
 
 Floats = NDArray[np.float64]
 
@@ -120,7 +120,8 @@ class Prediction:
     whole map, on average over all that they may face. ground: what level ground gets in the open,
     as a part of the light that suns replace, of each channel; nan where a channel has none, (3,).
     part: of all light that suns replace. of_residual: what the rest of the light is wrong by, where
-    it is shown without its shadows, as `error` counts: no suns mend that.
+    it is shown without its shadows, as `error` counts: no suns mend that. in_eevee: see
+    `two_orders`.
     """
 
     surfaces: Surfaces
@@ -129,6 +130,7 @@ class Prediction:
     ground: Floats
     part: float
     of_residual: float = 0.0
+    in_eevee: bool = False
 
     @classmethod
     def of(
@@ -136,11 +138,11 @@ class Prediction:
         patches: Patches | None,
         all_light: float,
         unshadowed: Patches | None = None,
-        two_orders: bool = False,
+        in_eevee: bool = False,
     ) -> Prediction:
         """patches: the light that suns shall replace. all_light: luminance of the whole map's
         scalar irradiance. unshadowed: a residual that is shown as if nothing stood before it; then
-        the suns are asked to make up for the shadows that it lacks. two_orders: it is shown as
+        the suns are asked to make up for the shadows that it lacks. in_eevee: all is shown as
         EEVEE does (see `two_orders`)."""
         given = [some for some in (patches, unshadowed) if some is not None]
         surfaces = surfaces_for(given, all_light)
@@ -149,7 +151,7 @@ class Prediction:
         if patches is not None:
             wanted += surfaces.of(patches)
         if unshadowed is not None:
-            if two_orders:
+            if in_eevee:
                 shown = irradiance_of_two_orders(unshadowed, surfaces.normals)
             else:
                 shown = surfaces.in_the_open().of(unshadowed)
@@ -162,13 +164,20 @@ class Prediction:
                 patches.flux, facing_up(patches.directions, half_widths(patches.spread))
             )
             part = float((patches.flux @ LUMINANCE_WEIGHTS).sum()) / all_light
-        return cls(surfaces, wanted, all_light / 4, ground, part, of_residual)
+        return cls(surfaces, wanted, all_light / 4, ground, part, of_residual, in_eevee)
 
     def error(self, suns: Sequence[Sun]) -> float:
         """Root mean square of what surfaces get wrong under shadows if these suns stand in for
         the light, as a part of the mean irradiance in the open."""
-        given = self.surfaces.irradiance(*_pieces(suns)) if len(suns) else 0.0
-        return float(np.sqrt(np.mean((given - self.irradiance) ** 2))) / self.mean
+        wide = [self.in_eevee and sun.angular_diameter > WIDEST_SHADOWED for sun in suns]
+        shadowed = [sun for sun, is_wide in zip(suns, wide, strict=True) if not is_wide]
+        open_to_all = [sun for sun, is_wide in zip(suns, wide, strict=True) if is_wide]
+        wrong = -self.irradiance
+        if shadowed:
+            wrong = wrong + self.surfaces.irradiance(*_pieces(shadowed))
+        if open_to_all:
+            wrong = wrong + self.surfaces.in_the_open().irradiance(*_pieces(open_to_all))
+        return float(np.sqrt(np.mean(wrong**2))) / self.mean
 
     def wrong_on_ground(self, suns: Sequence[Sun]) -> float:
         """What level ground in the open gets wrong of the worst channel, as a part of all light."""

@@ -36,6 +36,9 @@ MOST_OF_A_WORLD = 0.99
 """Where the residual is a scene's world: mirrors must have something to show. They show 3 to 15 %
 of the light then, as region A keeps what its surroundings shine."""
 
+CLEARLY = 0.98
+"""A higher share is taken where it is less wrong by more than this: lamps cost, in every frame."""
+
 ROUGH = 4096
 """Patches with which shares are compared: their order is what counts."""
 
@@ -107,7 +110,7 @@ def _truest(environment: EnvironmentMap, settings: ConversionSettings) -> Strata
             continue
         strata = stratify(environment, share, settings.strata)
         error = _error(environment, strata, settings)
-        if error < least:
+        if error < CLEARLY * least:
             best, least = strata, error
         rises = rises + 1 if error > before else 0
         before = error
@@ -123,15 +126,15 @@ def _error(environment: EnvironmentMap, strata: Strata, settings: ConversionSett
     if not settings.shadowed_residual:
         rest = light_of_map(without(environment, bright))
         unshadowed = patches_of(rest, rest.luminous_flux, ROUGH)
-    orders = settings.in_eevee
+    eevee = settings.in_eevee
     if not len(bright.pixels):
-        nothing = Prediction.of(None, strata.light, unshadowed, orders)
+        nothing = Prediction.of(None, strata.light, unshadowed, eevee)
         return nothing.error(()) if unshadowed else 0.0
     patches = bright.once("rough", lambda: patches_of(bright, bright.luminous_flux, ROUGH))
     prediction = bright.latest(
         "prediction",
-        (unshadowed, orders),
-        lambda: Prediction.of(patches, strata.light, unshadowed, orders),
+        (unshadowed, eevee),
+        lambda: Prediction.of(patches, strata.light, unshadowed, eevee),
     )
     suns = edge_suns(patches, strata, settings, settings.lights or USUAL_LIGHTS).suns
     error = prediction.error(suns)

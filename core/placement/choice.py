@@ -39,15 +39,15 @@ def choose_suns(
     """
     light = light.lit
     rest = patches_of(unshadowed, unshadowed.luminous_flux) if unshadowed else None
-    orders = settings.in_eevee
+    eevee = settings.in_eevee
     if not len(light.pixels):
-        error = Prediction.of(None, strata.light, rest, orders).error(()) if rest else 0.0
+        error = Prediction.of(None, strata.light, rest, eevee).error(()) if rest else 0.0
         return ChosenSuns((), error, (NO_SUN,) if settings.share is None else (), 0.0)
     patches = _patches(light, strata, MOST_PATCHES)
     prediction = light.latest(
         "prediction",
-        (strata, rest, orders),
-        lambda: Prediction.of(patches, strata.light, rest, orders),
+        (strata, rest, eevee),
+        lambda: Prediction.of(patches, strata.light, rest, eevee),
     )
     allowed = settings.allowed_error(float(light.luminous_flux.sum()) / strata.light)
     if allowed is not None and settings.tolerance is None:
