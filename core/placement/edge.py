@@ -9,7 +9,7 @@ from ..patches import Patches
 from ..settings import ConversionSettings
 from ..strata import Strata
 from ..suns import Sun, disc_sun, point_sun
-from .edge_light import PatchCells
+from .edge_cells import PatchCells
 from .edge_split import edge_split
 from .placement import ChosenSuns
 

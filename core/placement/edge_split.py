@@ -12,8 +12,10 @@ import numpy as np
 
 from ..patches import Patches
 from ..settings import Shape
+from .edge_balance import Balance
+from .edge_cells import PatchCells, cells_of, error_of, judged, squared_errors, widths
 from .edge_cuts import Cuts
-from .edge_light import EdgeLight, PatchCells, error_of
+from .edge_light import EdgeLight
 
 ROUNDS = 8, 8
 """How often borders are shared out before the cells are judged: three quarters of what can be won
@@ -46,24 +48,27 @@ class EdgeSplit:
         whole = EdgeLight.of(patches, shape)
         parts = whole.in_two_parts()
         self.patches = patches
-        self._whole, self._truest = whole, Cuts(parts, parts.squared_errors)
+        self._whole, self._truest = whole, Cuts(parts, squared_errors)
         lights = (whole,) if parts is whole else (whole, parts)
-        self._lights = [(light, Cuts(light, light.widths)) for light in lights]
+        self._beginnings = [(Balance(light), Cuts(light, widths)) for light in lights]
 
     def cells(self, count: int, allowed: float = 0.0) -> PatchCells:
         """See `edge_split`."""
         enough = self._enough(count, allowed)
         owner = self._truest.owner(enough)
-        best = self._whole.judge(self._whole.cells(owner))
+        best = judged(self._whole, cells_of(self._whole, owner))
         if enough == 1:
             return best
         tried = []
-        for light, widest in self._lights:
+        for balance, widest in self._beginnings:
             widest.grow(enough)
             for cut in (owner, widest.owner(min(enough, widest.count))):
-                tried.append((light, light.cells(cut)))
+                tried.append((balance, cells_of(balance.light, cut)))
         for steps in ROUNDS:
-            tried = [(light, light.judge(_balanced(light, cells, steps))) for light, cells in tried]
+            tried = [
+                (balance, judged(balance.light, balance.after(cells, steps)))
+                for balance, cells in tried
+            ]
             tried.sort(key=lambda one: one[1].error)
             best = min(best, tried[0][1], key=lambda cells: cells.error)
             tried = tried[:GO_ON]
@@ -86,13 +91,3 @@ class EdgeSplit:
             wrong = wrong[: np.argmax(within) + 1]
         # A round sun cut in two is two bad halves.
         return int(numbers[np.argmin(wrong.sum(axis=1))])
-
-
-def _balanced(light: EdgeLight, cells: PatchCells, steps: int) -> PatchCells:
-    """The cells after sharing out their borders so many times, or when nothing moves any more."""
-    for _ in range(steps):
-        owner = light.shared_out(cells)
-        if np.array_equal(owner, cells.owner):
-            break
-        cells = light.cells(owner)
-    return cells
