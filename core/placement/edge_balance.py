@@ -33,23 +33,23 @@ class Balance:
 
     light: EdgeLight
 
-    def after(self, cells: PatchCells, steps: int) -> PatchCells:
+    def after(self, cells: PatchCells, steps: int, together: float = TOGETHER) -> PatchCells:
         """The cells after so many steps, or when nothing moves any more."""
         for _ in range(steps):
-            owner = self.shared_out(cells)
+            owner = self.shared_out(cells, together)
             if np.array_equal(owner, cells.owner):
                 break
             cells = cells_of(self.light, owner)
         return cells
 
-    def shared_out(self, cells: PatchCells) -> Owner:
+    def shared_out(self, cells: PatchCells, together: float) -> Owner:
         """For each patch the cell that is best to have it: a new owner, (p,).
 
         Near, in a measure of each cell's own: bright and narrow cells take little from around
-        them. And where it brings the colours of a cell back together.
+        them. And where it brings the colours of a cell back together: see TOGETHER.
         """
         whole = cells.held[:, RELATIVE] @ SEEN_BY / SEEN_BY.sum()
-        owner = self._nearest(cells, whole)
+        owner = self._nearest(cells, whole, together)
         stays = self.light.light > HEAVY * whole[cells.owner]
         owner[stays] = cells.owner[stays]
         return owner
@@ -64,7 +64,7 @@ class Balance:
         parts += [vectors[:, 3 * c : 3 * c + 3] / whole for c in PULLED]
         return np.concatenate(parts, axis=1)
 
-    def _nearest(self, cells: PatchCells, whole: Floats) -> Owner:
+    def _nearest(self, cells: PatchCells, whole: Floats, together: float) -> Owner:
         """The cell to which the distance of each patch is the least, (p,).
 
         whole: light of each cell, (n,).
@@ -77,7 +77,7 @@ class Balance:
         for channel in PULLED:
             vector = cells.held[:, VECTORS][:, 3 * channel : 3 * channel + 3]
             aside = vector - (vector * cells.to_light).sum(axis=1)[:, None] * cells.to_light
-            aside *= (TOGETHER * scale / np.maximum(whole, 1e-300))[:, None]
+            aside *= (together * scale / np.maximum(whole, 1e-300))[:, None]
             of_cells.append(aside)
         cell_parts = np.concatenate(of_cells, axis=1).T
         owner = np.empty(len(self.light.patches), np.intp)

@@ -32,15 +32,21 @@ class PatchCells:
 
     owner: the cell of each patch, (p,). held: sums over each cell, see `EdgeLight.held`, (n, HELD).
     to_light: unit vectors, (n, 3). shortfall: 1 - R of each, where R is the length of its mean
-    direction, (n,). error: predicted for all of them together, as a part of all light of the
-    channel that is most wrong.
+    direction, (n,). wrong: what each is predicted to get wrong, see `squared_errors`, (n, JUDGED);
+    infinite before they are judged.
     """
 
     owner: Owner
     held: Floats
     to_light: Floats
     shortfall: Floats
-    error: float
+    wrong: Floats
+
+    @property
+    def error(self) -> float:
+        """Predicted for all of them together, as a part of all light of the channel that is most
+        wrong."""
+        return error_of(self.wrong.sum(axis=0))
 
     @property
     def flux(self) -> Floats:
@@ -55,19 +61,19 @@ def cells_of(light: EdgeLight, owner: Owner) -> PatchCells:
     count = int(occupied.sum())
     held = sums_of(owner, light.held, count)
     to_light, shortfall = light.moments(held, np.arange(len(owner)), owner)
-    return PatchCells(owner, held, to_light, shortfall, np.inf)
+    return PatchCells(owner, held, to_light, shortfall, np.full((count, JUDGED), np.inf))
 
 
 def judged(light: EdgeLight, cells: PatchCells) -> PatchCells:
-    """The same cells with their predicted error."""
+    """The same cells with what they are predicted to get wrong."""
     order = np.argsort(cells.owner, kind="stable")
     owner = cells.owner[order]
-    squared = np.zeros(JUDGED)
+    wrong = []
     for first in range(0, len(cells.held), CELLS):
         held = cells.held[first : first + CELLS]
         some = slice(*np.searchsorted(owner, (first, first + len(held))))
-        squared += _squared_errors(light, order[some], owner[some] - first, held).sum(axis=0)
-    return replace(cells, error=error_of(squared))
+        wrong.append(_squared_errors(light, order[some], owner[some] - first, held))
+    return replace(cells, wrong=np.concatenate(wrong))
 
 
 def squared_errors(light: EdgeLight, members: Owner, owner: Owner, count: int) -> Floats:
@@ -81,11 +87,13 @@ def squared_errors(light: EdgeLight, members: Owner, owner: Owner, count: int) -
 
 
 def widths(light: EdgeLight, members: Owner, owner: Owner, count: int) -> Floats:
-    """About what `squared_errors` says, at a fifth of the time: light squared, times how wide
-    it is, (n, JUDGED)."""
-    held = sums_of(owner, light.held.take(members, axis=0), count)
-    _, shortfall = light.moments(held, members, owner)
-    return held[:, TOTAL] ** 2 * np.sqrt(shortfall)[:, None]
+    """About what `squared_errors` says, at a fifth of the time; see `widths_of`."""
+    return widths_of(light, sums_of(owner, light.held.take(members, axis=0), count))
+
+
+def widths_of(light: EdgeLight, held: Floats) -> Floats:
+    """Light of cells squared, times how wide it is, (n, JUDGED). held: of each, (n, HELD)."""
+    return held[:, TOTAL] ** 2 * np.sqrt(light.shortfalls(held))[:, None]
 
 
 def _squared_errors(light: EdgeLight, members: Owner, owner: Owner, held: Floats) -> Floats:

@@ -120,22 +120,34 @@ class EdgeLight:
         return first if first.any() and not first.all() else None
 
     def moments(self, held: Floats, members: Owner, owner: Owner) -> tuple[Floats, Floats]:
-        """Mean directions (n, 3) and shortfalls (n,) of cells; see `PatchCells`.
+        """Mean directions (n, 3) and shortfalls (n,) of cells; see `edge_cells.PatchCells`.
+
+        held: of each cell, (n, HELD). members: patches, (m,), with the cell of each.
+        """
+        vector, total = self._vectors(held)
+        length = np.linalg.norm(vector, axis=1)
+        lost = length <= 1e-9 * total  # light from all sides
+        to_light = vector / np.where(lost, 1, length)[:, None]
+        for cell in np.flatnonzero(lost):
+            mine = members[owner == cell]
+            brightest = np.argmax(self.relative[mine] @ (SEEN_BY * held[cell, RELATIVE]))
+            to_light[cell] = self.patches.directions[mine[brightest]]
+        return to_light, np.maximum(1 - length / total, 0)
+
+    def shortfalls(self, held: Floats) -> Floats:
+        """The same without the directions, (n,)."""
+        vector, total = self._vectors(held)
+        return np.maximum(1 - np.linalg.norm(vector, axis=1) / total, 0)
+
+    def _vectors(self, held: Floats) -> tuple[Floats, Floats]:
+        """Sums of light times direction, (n, 3), and of that light, (n,).
 
         What a patch counts is by its cell's own colour, as what is little of a channel may lie
         anywhere. Each patch is as long as the mean of what it holds: sums are as over its pixels.
         """
         shares = SEEN_BY * held[:, RELATIVE]
         total = (shares * held[:, RELATIVE]).sum(axis=1)
-        vector = np.einsum("nc,nca->na", shares, held[:, VECTORS].reshape(-1, 3, 3))
-        length = np.linalg.norm(vector, axis=1)
-        lost = length <= 1e-9 * total  # light from all sides
-        to_light = vector / np.where(lost, 1, length)[:, None]
-        for cell in np.flatnonzero(lost):
-            mine = members[owner == cell]
-            brightest = np.argmax(self.relative[mine] @ shares[cell])
-            to_light[cell] = self.patches.directions[mine[brightest]]
-        return to_light, np.maximum(1 - length / total, 0)
+        return np.einsum("nc,nca->na", shares, held[:, VECTORS].reshape(-1, 3, 3)), total
 
 
 def sums_of(owner: Owner, values: Floats, count: int) -> Floats:

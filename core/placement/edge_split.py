@@ -2,27 +2,61 @@
 
 The cell for which that is worst is cut in two, until there are enough; then the cells share out
 their borders among each other. Where they begin decides where they end: several beginnings are
-tried, with colours weighed over the whole light or over its bright and its faint part each, and
-the best end is taken.
+tried, with colours weighed over the whole light or over its bright and its faint part each; the
+better ends go on, with the worst cells cut again, and with colours drawn together more strongly.
+The best end of all is taken.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..patches import Patches
 from ..settings import Shape
-from .edge_balance import Balance
+from .edge_balance import TOGETHER, Balance
 from .edge_cells import PatchCells, cells_of, error_of, judged, squared_errors, widths
 from .edge_cuts import Cuts
+from .edge_exchange import exchanged, filled
 from .edge_light import EdgeLight
 
-ROUNDS = 8, 8
+ROUNDS = 8, 4, 4
 """How often borders are shared out before the cells are judged: three quarters of what can be won
 comes with the first two times."""
 
 GO_ON = 2
 """Of the cells that were tried, how many go into another round."""
+
+STRONGER = 2.0
+"""In another round colours are also drawn together by so many times as much as before."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """Cells on their way. together: see `edge_balance.TOGETHER`."""
+
+    balance: Balance
+    cells: PatchCells
+    together: float = TOGETHER
+
+    def after(self, steps: int) -> _Trial:
+        """With borders shared out so many times, and judged."""
+        cells = self.balance.after(self.cells, steps, self.together)
+        return replace(self, cells=judged(self.balance.light, cells))
+
+    def ways_on(self, count: int) -> list[_Trial]:
+        """What may be better after another round; `count` cells."""
+        moved = exchanged(self.balance.light, self.cells, count)
+        return [replace(self, cells=moved), replace(self, together=STRONGER * self.together)]
+
+    def filled(self, count: int) -> PatchCells:
+        """With cells in the place of lost ones, if that is better."""
+        if len(self.cells.held) >= count:
+            return self.cells
+        light = self.balance.light
+        more = judged(light, filled(light, self.cells, count))
+        return min(self.cells, more, key=lambda cells: cells.error)
 
 
 def edge_split(patches: Patches, count: int, shape: Shape, allowed: float = 0.0) -> PatchCells:
@@ -56,22 +90,20 @@ class EdgeSplit:
         """See `edge_split`."""
         enough = self._enough(count, allowed)
         owner = self._truest.owner(enough)
-        best = judged(self._whole, cells_of(self._whole, owner))
+        best = _Trial(self._beginnings[0][0], cells_of(self._whole, owner)).after(0)
         if enough == 1:
-            return best
+            return best.cells
         tried = []
         for balance, widest in self._beginnings:
             widest.grow(enough)
             for cut in (owner, widest.owner(min(enough, widest.count))):
-                tried.append((balance, cells_of(balance.light, cut)))
+                tried.append(_Trial(balance, cells_of(balance.light, cut)))
         for steps in ROUNDS:
-            tried = [
-                (balance, judged(balance.light, balance.after(cells, steps)))
-                for balance, cells in tried
-            ]
-            tried.sort(key=lambda one: one[1].error)
-            best = min(best, tried[0][1], key=lambda cells: cells.error)
-            tried = tried[:GO_ON]
+            tried = [trial.after(steps) for trial in tried]
+            tried.sort(key=lambda trial: trial.cells.error)
+            best = min(best, tried[0], key=lambda trial: trial.cells.error)
+            tried = [way for trial in tried[:GO_ON] for way in trial.ways_on(enough)]
+        return best.filled(enough)
         return best
 
     def error_of_cuts(self, count: int) -> float:
