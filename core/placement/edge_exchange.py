@@ -73,13 +73,13 @@ def _joined(light: EdgeLight, cells: PatchCells, kept: Owner, most: int) -> tupl
     used[kept] = True
     for pair in np.argsort(both - own[first] - own[second], kind="stable"):
         stays, goes = first[pair], second[pair]
+        if len(freed) >= min(most, len(kept)):
+            break
         if used[stays] or used[goes]:
             continue
         used[[stays, goes]] = True
         becomes[goes] = stays
         freed.append(int(goes))
-        if len(freed) == min(most, len(kept)):
-            break
     return becomes, freed
 
 

@@ -29,7 +29,9 @@ GO_ON = 2
 """Of the cells that were tried, how many go into another round."""
 
 STRONGER = 2.0
-"""In another round colours are also drawn together by so many times as much as before."""
+"""In another round colours are also drawn together by so many times as much as before. With this
+and the cells that are moved, the worst channel of 4, 16 and 64 lights for 17 maps is wrong by 6.1,
+1.25 and .325 % instead of 6.6, 1.30 and .335 %."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,7 +61,7 @@ def _page(runs: Sequence[Run], first: Sequence[Run], seeds: Sequence[int]) -> li
         "",
         *_open_table(first, numbers),
         "",
-        "Seconds of one core to place the lights, median over the maps, from a map in memory to suns:",
+        "Seconds of one core, median over the maps, from a map in memory to suns:",
         "",
         *_seconds_table(first, numbers),
         "",
