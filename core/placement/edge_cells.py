@@ -33,7 +33,8 @@ class PatchCells:
     owner: the cell of each patch, (p,). held: sums over each cell, see `EdgeLight.held`, (n, HELD).
     to_light: unit vectors, (n, 3). shortfall: 1 - R of each, where R is the length of its mean
     direction, (n,). wrong: what each is predicted to get wrong, see `squared_errors`, (n, JUDGED);
-    infinite before they are judged.
+    infinite before they are judged. on_ground: what level ground gets too much or too little of
+    each, (n, JUDGED).
     """
 
     owner: Owner
@@ -41,12 +42,15 @@ class PatchCells:
     to_light: Floats
     shortfall: Floats
     wrong: Floats
+    on_ground: Floats
 
     @property
     def error(self) -> float:
         """Predicted for all of them together, as a part of all light of the channel that is most
-        wrong."""
-        return error_of(self.wrong.sum(axis=0))
+        wrong. A shadow's edge crosses few cells, but all of them shine on level ground: discs that
+        reach below the horizon are wrong to the same side."""
+        alone, together = (self.on_ground**2).sum(axis=0), self.on_ground.sum(axis=0) ** 2
+        return error_of(self.wrong.sum(axis=0) + GROUND * (together - alone))
 
     @property
     def flux(self) -> Floats:
@@ -61,19 +65,21 @@ def cells_of(light: EdgeLight, owner: Owner) -> PatchCells:
     count = int(occupied.sum())
     held = sums_of(owner, light.held, count)
     to_light, shortfall = light.moments(held, np.arange(len(owner)), owner)
-    return PatchCells(owner, held, to_light, shortfall, np.full((count, JUDGED), np.inf))
+    unknown, none = np.full((count, JUDGED), np.inf), np.zeros((count, JUDGED))
+    return PatchCells(owner, held, to_light, shortfall, unknown, none)
 
 
 def judged(light: EdgeLight, cells: PatchCells) -> PatchCells:
     """The same cells with what they are predicted to get wrong."""
     order = np.argsort(cells.owner, kind="stable")
     owner = cells.owner[order]
-    wrong = []
+    found = []
     for first in range(0, len(cells.held), CELLS):
         held = cells.held[first : first + CELLS]
         some = slice(*np.searchsorted(owner, (first, first + len(held))))
-        wrong.append(_squared_errors(light, order[some], owner[some] - first, held))
-    return replace(cells, wrong=np.concatenate(wrong))
+        found.append(_wrong(light, order[some], owner[some] - first, held))
+    wrong, on_ground = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return replace(cells, wrong=wrong, on_ground=on_ground)
 
 
 def squared_errors(light: EdgeLight, members: Owner, owner: Owner, count: int) -> Floats:
@@ -83,7 +89,7 @@ def squared_errors(light: EdgeLight, members: Owner, owner: Owner, count: int) -
     members: patches, (m,), with the cell of each, rising from 0: every cell has one.
     """
     held = sums_of(owner, light.held.take(members, axis=0), count)
-    return _squared_errors(light, members, owner, held)
+    return _wrong(light, members, owner, held)[0]
 
 
 def widths(light: EdgeLight, members: Owner, owner: Owner, count: int) -> Floats:
@@ -96,8 +102,9 @@ def widths_of(light: EdgeLight, held: Floats) -> Floats:
     return held[:, TOTAL] ** 2 * np.sqrt(light.shortfalls(held))[:, None]
 
 
-def _squared_errors(light: EdgeLight, members: Owner, owner: Owner, held: Floats) -> Floats:
-    """See `squared_errors`. held: what each cell holds of it all, (n, HELD)."""
+def _wrong(light: EdgeLight, members: Owner, owner: Owner, held: Floats) -> tuple[Floats, Floats]:
+    """See `squared_errors`, and `PatchCells.on_ground`. held: what each cell holds of it all,
+    (n, HELD)."""
     to_light, shortfall = light.moments(held, members, owner)
     half = np.zeros(len(held))
     if light.shape == "disc":
@@ -109,8 +116,9 @@ def _squared_errors(light: EdgeLight, members: Owner, owner: Owner, held: Floats
     of_disc = cap_beyond(edges.height, half[:, None])
     wrong = edges.beyond - held[:, None, TOTAL] * of_disc[..., None]
     squared = np.einsum("ne,nek->nk", edges.part, wrong**2)
-    on_ground = disc_on_ground(to_light[:, 2], half)[:, None]
-    return squared + GROUND * (held[:, SEEN] - held[:, TOTAL] * on_ground) ** 2
+    seen = held[:, TOTAL] * disc_on_ground(to_light[:, 2], half)[:, None]
+    on_ground = seen - held[:, SEEN]
+    return squared + GROUND * on_ground**2, on_ground
 
 
 def error_of(squared: Floats) -> float:
