@@ -145,6 +145,6 @@ def test_a_good_guess_saves_tries(truth, allowed):
         return SimpleNamespace(worst=truth / n, n=n)
 
     found = fewest(with_lights, allowed, 200, lambda n: 1 / n)
-    # The last one asks whether a quarter less would do.
-    assert len(tried) == len(set(tried)) <= 7
+    # Seven where the guess creeps up to what is needed; the last asks if a quarter less would do.
+    assert len(tried) == len(set(tried)) <= 8
     assert found.worst <= allowed
