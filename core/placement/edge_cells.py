@@ -47,8 +47,13 @@ class PatchCells:
     @property
     def error(self) -> float:
         """Predicted for all of them together, as a part of all light of the channel that is most
-        wrong. A shadow's edge crosses few cells, but all of them shine on level ground: discs that
-        reach below the horizon are wrong to the same side."""
+        wrong."""
+        return error_of(self.wrong.sum(axis=0))
+
+    @property
+    def level_error(self) -> float:
+        """The same where level ground must be right too. A shadow's edge crosses few cells, but all
+        of them shine on the ground, and discs that reach below the horizon err to one side."""
         alone, together = (self.on_ground**2).sum(axis=0), self.on_ground.sum(axis=0) ** 2
         return error_of(self.wrong.sum(axis=0) + GROUND * (together - alone))
 
