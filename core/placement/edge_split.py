@@ -3,8 +3,8 @@
 The cell for which that is worst is cut in two, until there are enough; then the cells share out
 their borders among each other. Where they begin decides where they end: several beginnings are
 tried, with colours weighed over the whole light or over its bright and its faint part each. The
-better ends go on, with the worst cells cut again, and with colours drawn together more strongly. The
-best of all is taken.
+better ends go on, with the worst cells cut again, and with colours drawn together more strongly;
+the best of all is taken.
 """
 
 from __future__ import annotations
