@@ -58,8 +58,8 @@ def patches_of(light: RegionLight, brightness: Floats, most: int = MOST_PATCHES)
     """Patches of a light: about `most` of them, or its pixels where they are fewer.
 
     brightness: of each pixel of the light, (p,), at least 0. Only pixels that shine count. Blocks
-    with much light, squared and times their width, are divided first: by so much a shadow's edge
-    across them could be wrong.
+    with much light of any colour, squared and times their width, are divided first: by so much a
+    shadow's edge across them could be wrong.
     """
     lit = light.luminous_flux > 0
     if not lit.all():
@@ -67,7 +67,7 @@ def patches_of(light: RegionLight, brightness: Floats, most: int = MOST_PATCHES)
     if len(light.pixels) <= most:
         return _pixels(light, brightness)
     sums, peaks = _pyramid(light, brightness)
-    badness = [level[..., 3] ** 2 * 2.0**k for k, level in enumerate(sums, start=1)]
+    badness = [_squared(level) * 2.0**k for k, level in enumerate(sums, start=1)]
     limit = _limit(badness, most)
     found = []
     whole = np.ones(sums[-1].shape[:2], bool)
@@ -117,6 +117,15 @@ def _single(light: RegionLight, brightness: Floats) -> Patches:
     """Each pixel as a patch."""
     squares = squares_of_pixels(light.pixels, light.width)
     return Patches(light.directions(), light.flux, light.spread(), brightness, squares)
+
+
+def _squared(sums: Floats) -> Floats:
+    """Light of blocks, (rows, columns, 7), squared: red, blue and luminance, each against all of
+    its kind. By luminance alone a blue sky around a warm sun gets blocks that are too large."""
+    kinds = sums[..., [0, 2, 3]]
+    total = kinds.sum(axis=(0, 1))
+    kinds = kinds / np.where(total > 0, total, np.inf)
+    return (kinds**2).sum(axis=-1)
 
 
 def _limit(badness: list[Floats], most: int) -> float:

@@ -89,7 +89,8 @@ def _fewest_by_edge(
     patches = _patches(light, strata, _enough_patches(likely))
 
     def with_lights(count: int) -> ChosenSuns:
-        chosen = _judged(edge_suns(patches, strata, settings, count), prediction, strata)
+        chosen = edge_suns(patches, strata, settings, count, level=True)
+        chosen = _judged(chosen, prediction, strata)
         if chosen.worst <= allowed or chosen.worst == chosen.predicted_error:
             return chosen
         level = replace(chosen, suns=levelled(chosen.suns, prediction.ground))

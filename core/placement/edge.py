@@ -11,7 +11,7 @@ from ..patches import Patches
 from ..settings import ConversionSettings
 from ..strata import Strata
 from ..suns import Sun, disc_sun, point_sun
-from .edge_light import PatchCells
+from .edge_cells import PatchCells
 from .edge_split import edge_split
 from .placement import ChosenSuns
 
@@ -21,11 +21,16 @@ of what the program allows by itself."""
 
 
 def edge_suns(
-    patches: Patches, strata: Strata, settings: ConversionSettings, lights: int
+    patches: Patches,
+    strata: Strata,
+    settings: ConversionSettings,
+    lights: int,
+    level: bool = False,
 ) -> ChosenSuns:
-    """At most `lights` suns for light that is cut into patches, one patch at least."""
+    """At most `lights` suns for light that is cut into patches, one patch at least. level: whether
+    level ground must be right as well as shadows."""
     share = float((patches.flux @ LUMINANCE_WEIGHTS).sum()) / strata.light
-    cells = edge_split(patches, lights, settings.shape, NO_TRUER / share)
+    cells = edge_split(patches, lights, settings.shape, NO_TRUER / share, level)
     notes = ()
     if settings.samples or settings.per_stratum or settings.position == "sample":
         notes = ("Samples, per stratum and position are of the other methods: edge has none.",)

@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .edge_light import EdgeLight, Floats, Owner, error_of
+from .edge_cells import error_of
+from .edge_light import EdgeLight, Floats, Owner
 
 ONE_IN = 8
 """One in so many cells is cut at a time: the worst of many would be cut soon anyway."""
 
-Measure = Callable[[Owner, Owner, int], Floats]
-"""What is wrong of cells: `EdgeLight.squared_errors`, or like it."""
+Measure = Callable[[EdgeLight, Owner, Owner, int], Floats]
+"""What is wrong of cells: `edge_cells.squared_errors`, or like it."""
 
 
 @dataclass(order=True)
@@ -93,7 +94,7 @@ class Cuts:
         """What is wrong of new cells, (m, JUDGED), which may be cut from now on."""
         members = np.concatenate([some for _, some in made])
         cell = np.repeat(np.arange(len(made)), [len(some) for _, some in made])
-        found = self._measure(members, cell, len(made))
+        found = self._measure(self._light, members, cell, len(made))
         for (number, some), wrong in zip(made, found, strict=True):
             rank = (-float(wrong.sum()), self._made)
             heapq.heappush(self._heap, _Cell(rank, number, some, wrong))

@@ -28,7 +28,8 @@ def fewest(
     expected: about how wrong so many are; a guess, so that few numbers must be tried.
     Where even `most` are not enough, those that are least wrong of all that were tried. The error
     need not fall evenly with the number; a number smaller by at most an eighth than is returned
-    was tried too, and is not enough: up to 15 lights that is the next smaller one.
+    was tried too, and is not enough: up to 15 lights that is the next smaller one. So was a number
+    smaller by a quarter.
     """
     tried: dict[int, ChosenSuns] = {}
 
@@ -43,6 +44,18 @@ def fewest(
             return min(tried.values(), key=lambda one: one.worst)
         aim = expected(high) * (allowed / error(high)) ** CAUTION
         low, high = high, _guess(high + 1, aim, most, expected)
+    while True:
+        high = _least_between(low, high, error, allowed)
+        fewer = high * 3 // 4
+        if not fewer or error(fewer) > allowed:
+            return tried[high]
+        high = fewer
+        low = max((n for n in tried if n < high and tried[n].worst > allowed), default=0)
+
+
+def _least_between(low: int, high: int, error: Callable[[int], float], allowed: float) -> int:
+    """About the least number from `low` + 1 to `high` that is wrong by at most `allowed`, as `high`
+    is: one that is smaller by at most an eighth is not, or it is `low`, which is not either."""
     while high - low > max(high // 8, 1):
         middle = (low + high) // 2
         if low and error(low) > allowed > error(high) > 0:
@@ -56,7 +69,7 @@ def fewest(
             low = middle
         else:
             high = middle
-    return tried[high]
+    return high
 
 
 def first_guess(allowed: float, most: int, expected: Callable[[int], float]) -> int:

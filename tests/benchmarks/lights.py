@@ -5,8 +5,9 @@
 
 The whole map becomes lights. Each is looked at by the same surfaces behind the same occluders (see
 `occluders`), and what they get is compared with what they get of the map itself, in float64.
-Errors are root mean squares in percent of the mean irradiance in the open. Run with
-OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 for seconds of one core.
+Errors are root mean squares in percent of the mean irradiance in the open. Seconds are of the
+process, all cores together, so that other work on the machine counts little; run with
+OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 they are seconds of one core.
 """
 
 from __future__ import annotations
@@ -90,14 +91,14 @@ def runs_of(
     runs = []
     for count in numbers:
         for way in WAYS:
-            start = time.perf_counter()
+            start = time.process_time()
             settings = replace(way.settings, lights=count)
             if settings.method == "edge":
                 patches = patches_of(light, strata.luminance.ravel()[light.pixels])
                 suns = edge_suns(patches, strata, settings, count).suns
             else:
                 suns = sampled_suns(light, strata, settings, count).suns
-            seconds = time.perf_counter() - start
+            seconds = time.process_time() - start
             predicted = prediction.error(suns)
             pieces = light_of_suns(suns)
             for (seed, hidden, truth), (_, opened, free) in zip(

@@ -61,7 +61,7 @@ def _page(runs: Sequence[Run], first: Sequence[Run], seeds: Sequence[int]) -> li
         "",
         *_open_table(first, numbers),
         "",
-        "Seconds to place the lights, median over the maps, from a map in memory to suns:",
+        "Seconds of one core, median over the maps, from a map in memory to suns:",
         "",
         *_seconds_table(first, numbers),
         "",
@@ -195,7 +195,7 @@ def _styles() -> dict[str, dict]:
 
 def _plot_numbers(runs: Sequence[Run], path: Path) -> None:
     numbers = sorted({run.lights for run in runs})
-    figure, axes = plt.subplots(figsize=(7, 5))
+    figure, axes = plt.subplots(figsize=(9, 5))
     for name, style in _styles().items():
         error = [100 * mean(r.luminance for r in some(runs, name, n)) for n in numbers]
         axes.plot(numbers, error, **style)
@@ -208,7 +208,7 @@ def _plot_numbers(runs: Sequence[Run], path: Path) -> None:
 
 def _plot_seconds(runs: Sequence[Run], path: Path) -> None:
     numbers = sorted({run.lights for run in runs})
-    figure, axes = plt.subplots(figsize=(7, 5))
+    figure, axes = plt.subplots(figsize=(9, 5))
     points = []
     for name, style in _styles().items():
         seconds = [float(np.median([r.seconds for r in some(runs, name, n)])) for n in numbers]
@@ -229,7 +229,7 @@ def _plot_seconds(runs: Sequence[Run], path: Path) -> None:
 
 def _finish(figure: plt.Figure, axes: plt.Axes, path: Path) -> None:
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=7)
+    axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5))  # beside all points
     figure.tight_layout()
     figure.savefig(path, dpi=110)
     plt.close(figure)

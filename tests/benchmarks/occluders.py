@@ -26,8 +26,9 @@ AIMED = 0.7
 NEVER = 2.0
 """The cosine of a cone that hides nothing."""
 
-AT_ONCE = 4096
-"""Directions that are looked at together: what fits into a processor's cache."""
+AT_ONCE = 256
+"""Directions that are looked at together: what fits into a processor's own memory, where the same
+sums take less than half of the time."""
 
 FINE_FLUX = ((1e-2, 64), (1e-3, 32), (1e-4, 16), (1e-5, 4))
 """A pixel with more than this part of all light counts as so many pieces along either side: as
@@ -64,19 +65,15 @@ class Occluders:
         which of all they are.
         """
         total = np.zeros((len(self.normals), flux.shape[1]))
-        single = self.cosines[:, 1] == NEVER
-        for some in (single, ~single):
-            cones = 1 if some is single else self.axes.shape[1]
-            axes = self.axes[some, :cones].reshape(-1, 3).T
-            cosines = self.cosines[some, :cones].ravel()
+        cones = (self.cosines < NEVER).sum(axis=1)  # the first ones of each
+        for some in (cones == 0, cones == 1, cones > 1):
             normals = self.normals[some].T
             for start in range(0, len(directions), AT_ONCE):
                 part = directions[start : start + AT_ONCE]
-                facing = np.maximum(part @ normals, 0)
-                hidden = part @ axes > cosines
-                if cones > 1:
-                    hidden = hidden.reshape(len(part), -1, cones).any(axis=2)
-                facing[hidden] = 0
+                facing = part @ normals
+                np.maximum(facing, 0, out=facing)
+                for cone in range(cones[some].max(initial=0)):
+                    facing *= part @ self.axes[some, cone].T <= self.cosines[some, cone]
                 if of_cosine:
                     facing = of_cosine(facing, slice(start, start + len(part)))
                 total[some] += facing.T @ flux[start : start + AT_ONCE]
@@ -154,18 +151,23 @@ def light_of_suns(suns: tuple[Sun, ...]) -> tuple[Floats, Floats]:
             continue
         part = float(sun.scalar_irradiance @ LUMINANCE_WEIGHTS / light)
         count = int(np.clip(POINTS * part, 128, 16_384))
-        index = np.arange(count) + 0.5
-        turn = index * (np.pi * (3 - np.sqrt(5)))  # a sunflower
-        first, second = sphere.tangents(sun.to_light)
-        along = 1 - index / count * 2 * np.sin(sun.angular_diameter / 4) ** 2
-        aside = np.sqrt(1 - along**2)
-        directions.append(
-            along[:, None] * sun.to_light
-            + (aside * np.cos(turn))[:, None] * first
-            + (aside * np.sin(turn))[:, None] * second
-        )
+        directions.append(disc(sun.to_light, sun.angular_diameter / 2, count))
         flux.append(np.repeat(sun.scalar_irradiance[None] / count, count, axis=0))
     return np.concatenate(directions), np.concatenate(flux)
+
+
+def disc(to_light: Floats, half_angle: float, count: int) -> Floats:
+    """Directions evenly over a disc, (count, 3); half_angle: radians."""
+    index = np.arange(count) + 0.5
+    turn = index * (np.pi * (3 - np.sqrt(5)))  # a sunflower
+    first, second = sphere.tangents(to_light)
+    along = 1 - index / count * 2 * np.sin(half_angle / 2) ** 2
+    aside = np.sqrt(1 - along**2)
+    return (
+        along[:, None] * to_light
+        + (aside * np.cos(turn))[:, None] * first
+        + (aside * np.sin(turn))[:, None] * second
+    )
 
 
 def _around(direction: Floats, angle: float, random: np.random.Generator) -> Floats:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sunsplit.core.patches import patches_of
+from sunsplit.core.placement.edge_cells import cells_of, squared_errors
 from sunsplit.core.placement.edge_cuts import Cuts
 from sunsplit.core.placement.edge_light import EdgeLight
 from sunsplit.core.placement.edge_split import EdgeSplit, edge_split
@@ -24,7 +25,7 @@ def patches():
 
 def cuts_of(some) -> Cuts:
     light = EdgeLight.of(some, "disc")
-    return Cuts(light, light.squared_errors)
+    return Cuts(light, squared_errors)
 
 
 def test_cells_do_not_depend_on_what_was_asked_for_before():
@@ -57,7 +58,7 @@ def test_what_is_wrong_of_each_number_is_the_sum_over_its_cells():
     for count in (1, 5, 22, 40):
         owner = cuts.owner(count)
         order = np.argsort(owner, kind="stable")
-        each = light.squared_errors(order, owner[order], count)
+        each = squared_errors(light, order, owner[order], count)
         assert cuts.wrong[count - 1] == pytest.approx(each.sum(axis=0), rel=1e-9)
 
 
@@ -66,7 +67,7 @@ def test_moments_are_those_of_sums_over_patches():
     some = patches()
     light, cuts = EdgeLight.of(some, "disc"), cuts_of(some)
     cuts.grow(12)
-    cells = light.cells(cuts.owner(12))
+    cells = cells_of(light, cuts.owner(12))
     colours = np.array([1.0, 0.01, 1.2])
     for cell in range(12):
         mine = cells.owner == cell

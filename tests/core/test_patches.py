@@ -101,3 +101,16 @@ def test_the_brightest_pixel_of_a_block_is_remembered():
     patches = patches_of(light, brightness, 1000)
     assert patches.brightness.max() == 0.3
     assert patches.brightness.min() == 0.2
+
+
+def test_faint_colours_have_patches_too():
+    """A red and a blue half: each is all that there is of its colour, whatever its luminance."""
+    pixels = sky(512, 0.0)
+    pixels[:, :256, 0] = pixels[:, 256:, 2] = 1
+    pixels *= 0.5 + np.random.default_rng(2).random((256, 512, 1))
+    light = light_of_map(pixels.astype(np.float32))
+    found = patches_of(light, light.luminous_flux, 2000)
+    red = int((found.flux[:, 0] > 0).sum())
+    blue = int((found.flux[:, 2] > 0).sum())
+    print(red, blue)
+    assert blue > 0.75 * red  # .58 by luminance alone

@@ -123,7 +123,7 @@ def test_too_few_lights_say_so(sunrise):
 
 
 @given(st.lists(st.floats(0.5, 2), min_size=40, max_size=40), st.floats(0.02, 2))
-def test_fewest_is_enough_and_an_eighth_less_is_not(bumps, allowed):
+def test_fewest_is_enough_and_fewer_are_not(bumps, allowed):
     """Whatever way the error takes; and whatever is expected of it."""
     errors = {n: bump / n for n, bump in enumerate(bumps, start=1)}
     found = fewest(lambda n: SimpleNamespace(worst=errors[n], n=n), allowed, 40)
@@ -132,6 +132,7 @@ def test_fewest_is_enough_and_an_eighth_less_is_not(bumps, allowed):
     elif found.n > 1:
         fewer = range(found.n - max(found.n // 8, 1), found.n)
         assert any(errors[n] > allowed for n in fewer)
+        assert errors[found.n * 3 // 4] > allowed
 
 
 @given(st.floats(0.3, 3), st.floats(0.02, 2))
@@ -144,5 +145,6 @@ def test_a_good_guess_saves_tries(truth, allowed):
         return SimpleNamespace(worst=truth / n, n=n)
 
     found = fewest(with_lights, allowed, 200, lambda n: 1 / n)
-    assert len(tried) == len(set(tried)) <= 6
+    # Seven where the guess creeps up to what is needed; the last asks if a quarter less would do.
+    assert len(tried) == len(set(tried)) <= 8
     assert found.worst <= allowed
