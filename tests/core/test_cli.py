@@ -116,6 +116,7 @@ def test_json_is_one_object_and_nothing_else(sky_file, out, capfd):
         "residual_width": None,
         "residual_samples": 500,
         "fill": "surroundings",
+        "mirrors": True,
         "threshold": 0,
     }
 
@@ -167,6 +168,7 @@ def test_the_papers_settings_arrive(sky_file, out, capfd):
         "residual_samples": 30,
         "residual_width": 32,
         "fill": "surroundings",
+        "mirrors": True,
         "share": 0.5,
     }
     words = [
