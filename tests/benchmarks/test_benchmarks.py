@@ -130,12 +130,13 @@ def test_eevee_shows_two_suns_as_cycles_does(tmp_path):
     predicted = irradiance_of_two_orders(patches, eevee_report.NORMALS) / np.pi
     shown = result.images["zero"][0, :, :3].mean(axis=-1)
     print(f"predicted {predicted}, shown {shown}")
-    assert shown == pytest.approx(predicted, rel=0.02)
+    # EEVEE keeps light in floats of 10 and 11 bits, whose steps are 1/32 and 1/64.
+    assert np.abs(shown - predicted).max() < predicted.mean() / 32
 
 
 @pytest.mark.skipif(bool(eevee.without_eevee()), reason=eevee.without_eevee() or "it can")
 def test_eevee_shadows_a_real_map_as_cycles_does(tmp_path, sunrise):
-    few = ["--size", "32", "--samples", "2", "--reference", "128"]
+    few = ["--size", "64", "--samples", "8", "--reference", "128"]
     (result,) = eevee.main([str(sunrise), *few, "-o", str(tmp_path)])
     assert result.lamps <= 32
     assert result.gain > 3
