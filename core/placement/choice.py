@@ -62,12 +62,28 @@ def choose_suns(
         else:
             chosen = fewest(sampled, allowed / 100, settings.most_lights)
     elif allowed is None:
-        chosen = edge_suns(patches, strata, settings, settings.most_lights)
-        chosen = _judged(chosen, prediction, strata)
+        chosen = _as_many_as_help(patches, strata, settings, prediction)
     else:
         chosen = _fewest_by_edge(light, strata, settings, prediction, allowed / 100)
     notes = (*chosen.notes, *_count_note(chosen, light, settings, prediction, allowed))
     return replace(chosen, notes=notes)
+
+
+def _as_many_as_help(
+    patches: Patches, strata: Strata, settings: ConversionSettings, prediction: Prediction
+) -> ChosenSuns:
+    """As many as were asked for. Where cells say that fewer do, as on an even map, half as many may
+    do better still: what cells get wrong is added up cell by cell, and what wide discs get wrong
+    together can be more than that, or less."""
+    count = settings.most_lights
+    best = _judged(edge_suns(patches, strata, settings, count), prediction, strata)
+    while 1 < len(best.suns) < count:
+        count = len(best.suns) // 2 + 1
+        fewer = _judged(edge_suns(patches, strata, settings, count), prediction, strata)
+        if fewer.predicted_error >= best.predicted_error:
+            break
+        best = fewer
+    return best
 
 
 def _fewest_by_edge(
