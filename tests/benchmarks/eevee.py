@@ -42,7 +42,7 @@ is beyond half floats."""
 @dataclass(frozen=True, eq=False)
 class Result:
     """One map in one scene. images: by way, (height, width, 4). truth: of the eight plates in
-    closed form, (8, 3), else None. The rest as in `eevee_renders.Renders`."""
+    closed form, (n, 3), else None. The rest as in `eevee_renders.Renders`."""
 
     map: str
     scene: str
@@ -119,7 +119,7 @@ def measure(path: Path, scene: str, options: argparse.Namespace) -> Result:
     with tempfile.TemporaryDirectory(prefix="eevee-") as name:
         command = [sys.executable, "-m", "tests.benchmarks.eevee_renders", str(path), name]
         command += ["--scene", scene, "--samples", str(options.samples)]
-        command += ["--reference", str(options.reference)]
+        command += ["--reference", str(options.reference), "--plates", str(options.plates)]
         if options.size and scene == "shadows":
             command += ["--size", str(options.size)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -153,6 +153,7 @@ def main(arguments: Sequence[str] | None = None) -> list[Result]:
     parser.add_argument("--analytic", nargs="*", choices=ANALYTIC, help="maps of closed form")
     parser.add_argument("--scenes", nargs="*", default=["shadows"], help="for each given map")
     parser.add_argument("--size", type=int)
+    parser.add_argument("--plates", type=int, default=8, help="orientations of the plate")
     parser.add_argument("--samples", type=int, default=16, help="of EEVEE")
     parser.add_argument("--reference", type=int, default=512, help="samples of Cycles, twice")
     options = parser.parse_args(arguments)
@@ -163,7 +164,8 @@ def main(arguments: Sequence[str] | None = None) -> list[Result]:
         for path, scene in known + [(p, s) for s in options.scenes for p in options.maps]:
             result = measure(path, scene, options)
             if scene == "plate":
-                result = eevee_report.with_truth(result, plates_of(path, eevee_report.NORMALS))
+                normals = eevee_report.NORMALS[: options.plates]
+                result = eevee_report.with_truth(result, plates_of(path, normals))
             results.append(result)
             print(eevee_report.line(result), flush=True)
             eevee_report.write(results, options.output, options.name)

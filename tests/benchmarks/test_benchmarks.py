@@ -119,7 +119,8 @@ def test_methods(tmp_path, sunrise):
 
 @pytest.mark.skipif(bool(eevee.without_eevee()), reason=eevee.without_eevee() or "it can")
 def test_eevee_shows_two_suns_as_cycles_does(tmp_path):
-    few = ["--analytic", "two opposite suns", "--samples", "2", "--reference", "128"]
+    few = ["--analytic", "two opposite suns", "--plates", "3", "--samples", "1"]
+    few += ["--reference", "128"]
     (result,) = eevee.main([*few, "-o", str(tmp_path)])
     assert result.wrong("converted") < 0.02
     assert result.gain > 8
@@ -127,7 +128,7 @@ def test_eevee_shows_two_suns_as_cycles_does(tmp_path):
     # What is predicted of EEVEE's world is what EEVEE shows of it.
     light = light_of_map(load(path).radiance)
     patches = patches_of(light, light.luminous_flux)
-    predicted = irradiance_of_two_orders(patches, eevee_report.NORMALS) / np.pi
+    predicted = irradiance_of_two_orders(patches, eevee_report.NORMALS[:3]) / np.pi
     shown = result.images["zero"][0, :, :3].mean(axis=-1)
     print(f"predicted {predicted}, shown {shown}")
     # EEVEE keeps light in floats of 10 and 11 bits, whose steps are 1/32 and 1/64.
