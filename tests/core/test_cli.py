@@ -168,7 +168,6 @@ def test_the_papers_settings_arrive(sky_file, out, capfd):
         "residual_samples": 30,
         "residual_width": 32,
         "fill": "surroundings",
-        "mirrors": True,
         "share": 0.5,
     }
     words = [

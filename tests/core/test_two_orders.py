@@ -36,7 +36,13 @@ def test_a_gentle_slope_is_exact():
 
 def test_one_sun_is_spread_and_lessened():
     to_light = direction(20, 50)[None]
-    sun = Patches(to_light, np.full((1, 3), 4.0), np.zeros(1), np.ones(1))
+    sun = Patches(
+        to_light,
+        np.full((1, 3), 4.0),
+        np.zeros(1),
+        np.ones(1),
+        np.zeros((1, 3), np.int32),
+    )
     found = irradiance_of_two_orders(sun, np.array([to_light[0], -to_light[0]]))
     assert found == pytest.approx([1 + STEEPEST, 1 - STEEPEST])
 
