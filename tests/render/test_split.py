@@ -72,8 +72,8 @@ def test_a_white_plate(tmp_path, hdri, normal):
     camera.location = Vector(normal) * 2
     expected = 0.8 / np.pi * irradiance(hdri, normal)
     plain = estimate(scene, tmp_path, 48)
-    # The tolerance is of the mean irradiance; what faces down sees a twentieth of that, and with 0.3
-    # is off by as much as is looked for here.
+    # The tolerance is of the mean irradiance. What faces down sees a twentieth of that, and is off
+    # by as much as is looked for here with 0.3.
     bpy.ops.sunsplit.convert(tolerance=0.2)
     split = estimate(scene, tmp_path, 48)
     means_agree(plain, split, tmp_path)
