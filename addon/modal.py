@@ -21,18 +21,14 @@ NAVIGATION = {
 
 
 class InSteps:
-    """For an operator that has `work` and `done`."""
+    """For an operator that has `work(context)`, which gives the steps, and `done(context, result)`,
+    which says what to do with their result, as Blender wants to be answered. Steps raise
+    SunsplitError for the user to read.
+
+    home: the module of the add-on that `work` needs: it is imported apart, as that takes a while.
+    """
 
     home = ""
-    """The module of the add-on that `work` needs: it is imported apart, as that takes a while."""
-
-    def work(self, context: bpy.types.Context) -> Steps:
-        """The steps; they raise SunsplitError for the user to read."""
-        raise NotImplementedError
-
-    def done(self, context: bpy.types.Context, result: object) -> set[str]:
-        """What to do with their result."""
-        raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import bpy
 
@@ -97,8 +98,7 @@ def conversion_steps(
         lambda listen, _: known_conversion(environment, needed, visible, listen), READ, MADE
     )
     with folder_for_maps() as folder:
-        maps = _maps_of(conversion, needs)
-        paths = yield Apart(lambda *_: [write_map(folder, *made) for made in maps.items()], MADE, 1)
+        paths = yield Apart(lambda *_: _write_maps(folder, conversion, needs), MADE, 1)
         outlines = yield Apart(lambda *_: outlines_of(conversion).to_text(), 1, 1)
         images = {path.stem: packed_image(path) for path in paths}
     result = _replace(scene, light, conversion, images, settings, options, found)
@@ -145,8 +145,8 @@ def _what_is_visible(
     )
 
 
-def _maps_of(conversion: Conversion, needs: SceneNeeds) -> dict[str, Radiance]:
-    """What the converted world shows instead of the map, by what it is."""
+def _write_maps(folder: Path, conversion: Conversion, needs: SceneNeeds) -> list[Path]:
+    """Files of what the converted world shows instead of the map, named by what it is."""
     maps: dict[str, Radiance] = {}
     residual = conversion.levelled or conversion.residual
     if residual is not None:
@@ -155,7 +155,7 @@ def _maps_of(conversion: Conversion, needs: SceneNeeds) -> dict[str, Radiance]:
     width = needs.width_for_camera(environment.own_width)
     if needs.camera_sees_world and width != environment.own_width:
         maps["camera"] = environment.narrowed(width)
-    return maps
+    return [write_map(folder, *made) for made in maps.items()]
 
 
 def _replace(
