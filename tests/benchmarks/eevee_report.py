@@ -123,7 +123,7 @@ def _plot(results: Sequence[Result], path: Path) -> None:
     axes.set_xlim(0, 1.1 * max(plain))
     axes.set_xlabel("EEVEE against Cycles, RMS in % of the mean")
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(loc="lower right", frameon=False)
+    figure.legend(loc="outside upper center", ncols=2, frameon=False)
     figure.savefig(path, dpi=120)
     plt.close(figure)
 
