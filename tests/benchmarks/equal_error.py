@@ -165,20 +165,27 @@ def _curve(
         if (j - i) % 2
     ]
     square = np.mean(products, axis=0)
-    each, start = np.polyfit(
-        *zip(*[(count, _median(shots, count)) for count in {one[0] for one in shots}], strict=True),
-        1,
-    )
+    start, each = _times({count: _median(shots, count) for count in {one[0] for one in shots}})
     return Curve(
         *name,
         noise=float(np.median(noises)),
         bias=float(np.sqrt(max(square.mean(), 0))) / mean,
         unsure=_standard_error(square) / mean**2,
         mean=float(np.mean(longest)) / mean - 1,
-        start=max(float(start), 0.0),
-        each=float(each),
+        start=start,
+        each=each,
         memory=memory,
     )
+
+
+def _times(seconds: dict[int, float]) -> tuple[float, float]:
+    """Seconds before the first sample and for each, by those of so many samples: neither is below
+    0, as a straight line may have it where short renders take as long as the machine likes."""
+    from scipy.optimize import nnls
+
+    rows = np.array([(1.0, count) for count in seconds])
+    start, each = nnls(rows, np.array(list(seconds.values())))[0]
+    return float(start), float(each)
 
 
 def _standard_error(pixels: np.ndarray) -> float:

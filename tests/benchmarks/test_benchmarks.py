@@ -91,6 +91,18 @@ def test_equal_error(tmp_path, sunrise):
     assert sum(line.startswith("| spruit_sunrise_1k") for line in lines) == 2
 
 
+@pytest.mark.parametrize(
+    ("seconds", "expected"),
+    [
+        ({1: 2.0, 4: 5.0, 16: 17.0}, (1, 1)),
+        ({1: 2.0, 4: 1.0}, (1.5, 0)),  # more samples in less time: nothing can be told of one
+        ({1: 1.0, 4: 7.0}, (0, 29 / 17)),
+    ],
+)
+def test_times_of_samples_are_none_below_zero(seconds, expected):
+    assert equal_error._times(seconds) == pytest.approx(expected)
+
+
 def test_light_tree(tmp_path, sunrise):
     few = ["--size", "16", "--samples", "2", "--repeats", "2", "--scenes", "product"]
     results = light_tree.main([str(sunrise), *few, "-o", str(tmp_path)])
