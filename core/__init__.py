@@ -17,15 +17,20 @@ if TYPE_CHECKING:
     from .files.conversion import account_of_files, save
     from .files.maps import load
     from .files.samples_json import read_samples
+    from .library.options import LibraryOptions
+    from .library.run import LibraryResult, convert_library
     from .settings import ConversionSettings
 
 _HOMES = {
     "Conversion": "conversion",
     "ConversionSettings": "settings",
     "EnvironmentMap": "environment",
+    "LibraryOptions": "library.options",
+    "LibraryResult": "library.run",
     "SunsplitError": "errors",
     "account_of_files": "files.conversion",
     "convert": "conversion",
+    "convert_library": "library.run",
     "load": "files.maps",
     "read_samples": "files.samples_json",
     "save": "files.conversion",
@@ -35,9 +40,12 @@ __all__ = [
     "Conversion",
     "ConversionSettings",
     "EnvironmentMap",
+    "LibraryOptions",
+    "LibraryResult",
     "SunsplitError",
     "account_of_files",
     "convert",
+    "convert_library",
     "load",
     "read_samples",
     "save",

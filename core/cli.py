@@ -1,4 +1,4 @@
-"""The command line: `sunsplit convert`, `info` and `figures`. Needs no Blender.
+"""The command line: `sunsplit convert`, `info`, `figures` and `library`. Needs no Blender.
 
 Exit status: 0 done, 1 the input cannot be used or the output not written, 2 wrong usage,
 130 cancelled.
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from . import interrupts
+from .cli_library import add_library
 from .cli_settings import (
     add_figure_settings,
     add_settings,
@@ -96,20 +97,10 @@ class _Version(argparse.Action):
     """Prints the version; looks it up only when asked, which `--help` need not wait for."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        print(f"sunsplit {_version()}")
+        from .version import version
+
+        print(f"sunsplit {version()}")
         parser.exit()
-
-
-def _version() -> str:
-    """From the add-on's manifest; a package that pip has installed has metadata instead."""
-    import tomllib
-    from importlib import metadata
-
-    manifest = Path(__file__).parent.parent / "blender_manifest.toml"
-    try:
-        return tomllib.loads(manifest.read_text(encoding="utf-8"))["version"]
-    except FileNotFoundError:
-        return metadata.version("sunsplit")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -145,6 +136,13 @@ def _parser() -> argparse.ArgumentParser:
     add_figure_settings(figures)
     figures.add_argument("--json", action="store_true", help="print the result as JSON")
     figures.set_defaults(run=run_figures)
+    add_library(
+        verbs.add_parser(
+            "library",
+            help="convert all HDRIs in a folder and the folders in it",
+            description="Convert a folder of maps; what is done already is not done again.",
+        )
+    )
     return parser
 
 

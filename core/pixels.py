@@ -36,6 +36,15 @@ class Pixels(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class MapSize:
+    """What a file's header says of its map. held: its pixels can only be read all at once."""
+
+    width: int
+    height: int
+    held: bool
+
+
 @dataclass(frozen=True, eq=False)
 class HeldPixels:
     """Pixels that are in memory. planes: red, green and blue, (height, width) each."""

@@ -7,7 +7,6 @@ once, a few rows at a time, on all cores.
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
+from .cores import usable
 from .pixels import Pixels, Strip, copy_as_float64, highest_light, planes_of
 from .progress import Progress, silent
 from .repairs import RepairedPixels, Repairs, highest_finite, repair_planes, repaired_strips
@@ -145,7 +145,7 @@ def _on_all_cores(
 
     No sum depends on the number of cores: each block is added up by one of them.
     """
-    cores = os.cpu_count() or 1
+    cores = usable()
     waiting: deque[tuple[int, Future[_Found]]] = deque()
     top = 0
     with ThreadPoolExecutor(cores) as pool:

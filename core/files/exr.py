@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .. import sphere
 from ..environment import scalar_irradiance
 from ..errors import UnusableInput
-from ..pixels import HeldPixels, Pixels, Strip
+from ..pixels import HeldPixels, MapSize, Pixels, Strip
 from ..reduction import narrowed, rows_of, total_light
 from ..tolerances import HALF_ENERGY, HALF_MAXIMUM
 from . import image
@@ -59,6 +59,16 @@ def read(path: Path) -> tuple[Pixels, list[str]]:
         return pixels, warnings
     planes, remarks = _in_display_window(_read_planes(path, layer, header), header)
     return HeldPixels(planes), [*warnings, *remarks]
+
+
+def size_of(path: Path) -> MapSize:
+    """By its header alone. Raises UnusableInput."""
+    headers = _read_headers(path)
+    layer, _ = choose_layer(headers, path.name)
+    header = headers[layer.part]
+    cropped = _is_cropped(header)
+    width, height = _size(_window(header, "displayWindow" if cropped else "dataWindow"))
+    return MapSize(width, height, held=cropped or len(headers) > 1)
 
 
 def is_plain(path: Path) -> bool:

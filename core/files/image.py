@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UnusableInput
+from ..pixels import MapSize
 from .limits import refuse_absurd_size, too_large_for_memory
 from .quiet import quiet_libraries
 from .tiff import is_zip_whole
@@ -37,6 +38,20 @@ def read(path: Path, allow_ldr: bool, upright: bool = True) -> NDArray[np.float3
         pixels = _upright(pixels, spec.getattribute("Orientation") or 1)
     colour = pixels[..., [0, 0, 0]] if spec.nchannels < 3 else pixels[..., :3]
     return np.ascontiguousarray(colour if linear else _from_srgb(colour))
+
+
+def size_of(path: Path, allow_ldr: bool) -> MapSize:
+    """By its header alone. Raises UnusableInput."""
+    with quiet_libraries():
+        source = _open(path)
+        try:
+            _check(source, path, allow_ldr)
+            spec = source.spec()
+        finally:
+            source.close()
+    turned = (spec.getattribute("Orientation") or 1) >= 5
+    width, height = (spec.height, spec.width) if turned else (spec.width, spec.height)
+    return MapSize(width, height, held=True)
 
 
 @contextmanager

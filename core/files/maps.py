@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..environment import EnvironmentMap, environment_from_strips
 from ..errors import UnusableInput
-from ..pixels import HeldPixels, Pixels
+from ..pixels import HeldPixels, MapSize, Pixels
 from ..progress import Progress, silent
 from . import exr, image, radiance
 
@@ -28,6 +28,16 @@ def load(path: str | Path, allow_ldr: bool = False, progress: Progress = silent)
         except MemoryError as error:
             raise UnusableInput(f"{path.name} does not fit into memory.") from error
         return replace(environment, sha256=digest.result(), warnings=tuple(warnings))
+
+
+def size_of(path: Path, allow_ldr: bool = False) -> MapSize:
+    """What a file's header says of its map; nothing else is read. Raises UnusableInput."""
+    magic = _first_bytes(path)
+    if magic == exr.MAGIC:
+        return exr.size_of(path)
+    if magic.startswith(radiance.MAGIC):
+        return radiance.size_of(path)
+    return image.size_of(path, allow_ldr)
 
 
 def _open(path: Path, magic: bytes, allow_ldr: bool) -> tuple[Pixels, list[str]]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..environment import working_width
 from ..errors import UnusableInput
-from ..pixels import HeldPixels, Pixels
+from ..pixels import HeldPixels, MapSize, Pixels
 from . import image
 from .limits import refuse_absurd_size
 from .strips import HdrPixels
@@ -63,14 +63,11 @@ def read(path: Path) -> Pixels:
     EXPOSURE, PRIMARIES and the like are left alone, as Blender does: many programs write nonsense
     there, and a constant factor changes no split.
     """
-    with path.open("rb") as file:
-        head = file.read(LONGEST_HEADER + 4)
-    header = _read_header(head, path.name)
-    refuse_absurd_size(path.name, header.width, header.height)
+    head, header = _head_of(path)
     if path.stat().st_size - header.start < _least_bytes(header):
         raise _truncated(path.name)
-    if _has_new_runs(head[header.start : header.start + 4], header.length):
-        if header.is_upright and working_width(header.width) < header.width:
+    if _has_new_runs(head, header):
+        if _is_read_in_strips(head, header):
             return HdrPixels(path, header.width, header.height)
         stored = image.read(path, allow_ldr=False, upright=False)
     else:
@@ -78,6 +75,26 @@ def read(path: Path) -> Pixels:
     if stored.shape != (header.scanlines, header.length, 3):
         raise UnusableInput(f"{path.name} is damaged: its pixels do not fill its frame.")
     return HeldPixels.of(_upright(stored, header))
+
+
+def size_of(path: Path) -> MapSize:
+    """By its header alone. Raises UnusableInput."""
+    head, header = _head_of(path)
+    return MapSize(header.width, header.height, held=not _is_read_in_strips(head, header))
+
+
+def _head_of(path: Path) -> tuple[bytes, _Header]:
+    """A file's first bytes and its header in them."""
+    with path.open("rb") as file:
+        head = file.read(LONGEST_HEADER + 4)
+    header = _read_header(head, path.name)
+    refuse_absurd_size(path.name, header.width, header.height)
+    return head, header
+
+
+def _is_read_in_strips(head: bytes, header: _Header) -> bool:
+    wide = working_width(header.width) < header.width
+    return wide and header.is_upright and _has_new_runs(head, header)
 
 
 def _read_header(head: bytes, name: str) -> _Header:
@@ -113,7 +130,8 @@ def _until_blank_line(head: bytes) -> tuple[list[bytes], bool, bytes]:
     return lines, False, b""
 
 
-def _has_new_runs(first: bytes, length: int) -> bool:
+def _has_new_runs(head: bytes, header: _Header) -> bool:
+    first, length = head[header.start : header.start + 4], header.length
     return length in NEW_RUNS and first[:2] == b"\2\2" and first[2:] == length.to_bytes(2, "big")
 
 

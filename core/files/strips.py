@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..cores import usable
 from ..pixels import Strip
 from . import image
 from .limits import damaged_exr, too_large_for_memory
@@ -100,12 +100,12 @@ def _is_unicode(path: Path) -> bool:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[InputFile]:
-    """For reading on all cores."""
+    """For reading on all cores that there are for us."""
     import OpenEXR
 
     with ExitStack() as stack:
         stack.callback(OpenEXR.set_global_thread_count, OpenEXR.global_thread_count())
-        OpenEXR.set_global_thread_count(os.cpu_count() or 1)
+        OpenEXR.set_global_thread_count(usable())
         try:
             # By its name: many threads cannot read from one stream of Python's.
             with quiet_libraries():

@@ -1,0 +1,94 @@
+"""The master's side of worker processes: see `serving` for the other one."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from ..cores import LIMIT
+
+Answer = dict[str, Any]
+
+ONE_CORE = {
+    name: "1" for name in (LIMIT, "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+}
+"""Each worker has a core of its own: threads of many workers would wait for one another."""
+
+
+def converter() -> list[str]:
+    """The command of a process that converts maps."""
+    # Isolated: with nothing but what it is told to import from, as its master does.
+    return [sys.executable, "-I", str(Path(__file__).with_name("worker.py"))]
+
+
+class Worker:
+    """A process that does one job at a time.
+
+    on_answer: called from a thread with this worker and an answer, or None when the process has
+    ended, however it came to that.
+    """
+
+    def __init__(
+        self, command: Sequence[str], on_answer: Callable[[Worker, Answer | None], None]
+    ) -> None:
+        self._on_answer = on_answer
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=os.environ | ONE_CORE,
+            encoding="utf-8",
+        )
+        self._seen = psutil.Process(self._process.pid)
+        self._send({"path": sys.path})
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def start(self, job: dict[str, Any]) -> None:
+        """Give it a job. If it has died, that is the answer."""
+        self._send(job)
+
+    def memory(self) -> int:
+        """Bytes that it holds now, with its children; 0 once it has ended."""
+        try:
+            family = [self._seen, *self._seen.children(recursive=True)]
+            return sum(process.memory_info().rss for process in family)
+        except psutil.Error:
+            return 0
+
+    def kill(self) -> None:
+        """End it at once, whatever it does."""
+        self._process.kill()
+        self._process.wait()
+
+    def close(self) -> None:
+        """Let it end by itself, as it has nothing to do."""
+        with suppress(OSError):
+            if self._process.stdin:
+                self._process.stdin.close()
+
+    def ending(self) -> str:
+        """How it has ended, in words."""
+        status = self._process.wait()
+        return f"signal {-status}" if status < 0 else f"exit status {status}"
+
+    def _send(self, what: dict[str, Any]) -> None:
+        assert self._process.stdin is not None
+        with suppress(BrokenPipeError):
+            self._process.stdin.write(json.dumps(what) + "\n")
+            self._process.stdin.flush()
+
+    def _listen(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            self._on_answer(self, json.loads(line))
+        self._process.wait()
+        self._on_answer(self, None)
