@@ -84,7 +84,8 @@ class Worker:
             self._process.stdin.flush()
 
     def _listen(self) -> None:
-        assert self._process.stdout is not None and self._process.stdin is not None
+        assert self._process.stdout is not None
+        assert self._process.stdin is not None
         with self._process.stdout as answers:
             for line in answers:
                 self._on_answer(self, json.loads(line))
