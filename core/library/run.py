@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -39,6 +40,9 @@ class Settled:
     total: int
     fraction: float
 
+
+log = logging.getLogger("sunsplit")
+"""What happens to each map, for pipelines that listen: failures are warnings."""
 
 Listener = Callable[[Settled], None]
 """Called in the thread that has called `convert_library`; what it raises ends the run."""
@@ -226,6 +230,10 @@ class _Told:
     def settled(self, number: int, row: Row, known: bool) -> None:
         self._number += 1
         self._weight += self._weights[number]
+        if row.status == "failed":
+            log.warning("%s: %s", row.source, row.sentence)
+        elif not known:
+            log.info("%s: %d lights, %.1f s", row.source, row.lights, row.seconds)
         if self._listen:
             total, fraction = len(self._weights), self._weight / self._whole
             self._listen(Settled(row, known, self._number, total, fraction))

@@ -18,10 +18,9 @@ def main() -> None:
     serving, work = (import_module(f"sunsplit.core.library.{n}") for n in ("serving", "work"))
     import gc
 
-    # What takes long to import, before the first map: none of them shall be charged with it.
     for name in ("conversion", "files.conversion", "files.maps"):
         import_module(f"sunsplit.core.{name}")
-    gc.freeze()
+    gc.freeze()  # what is there by now stays: it need not be looked at after each map
 
     def convert(job: dict) -> dict:
         try:
@@ -30,6 +29,7 @@ def main() -> None:
             gc.collect()  # maps lie in cycles, and would stay until there are many
 
     serving.serve(convert)
+    gc.unfreeze()  # libraries look for what is left when Python ends, and complain
 
 
 def _load_package() -> None:
