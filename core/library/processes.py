@@ -15,6 +15,7 @@ from typing import Any
 import psutil
 
 from ..cores import LIMIT
+from ..errors import SunsplitError
 
 Answer = dict[str, Any]
 
@@ -30,8 +31,12 @@ def converter() -> list[str]:
     return [sys.executable, "-I", str(Path(__file__).with_name("worker.py"))]
 
 
+class NoWorker(SunsplitError):
+    """The system does not start a process."""
+
+
 class Worker:
-    """A process that does one job at a time.
+    """A process that does one job at a time. Raises NoWorker.
 
     on_answer: called from a thread with this worker and an answer, or None when the process has
     ended, however it came to that.
@@ -41,13 +46,16 @@ class Worker:
         self, command: Sequence[str], on_answer: Callable[[Worker, Answer | None], None]
     ) -> None:
         self._on_answer = on_answer
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=os.environ | ONE_CORE,
-            encoding="utf-8",
-        )
+        try:
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                env=os.environ | ONE_CORE,
+                encoding="utf-8",
+            )
+        except OSError as error:
+            raise NoWorker(f"No worker can be started: {error.strerror or error}.") from error
         self._seen = psutil.Process(self._process.pid)
         self._send({"path": sys.path})
         self._listener = threading.Thread(target=self._listen, daemon=True)

@@ -43,6 +43,7 @@ class Settled:
 
 log = logging.getLogger("sunsplit")
 """What happens to each map, for pipelines that listen: failures are warnings."""
+log.addHandler(logging.NullHandler())  # else Python prints them where nobody listens
 
 Listener = Callable[[Settled], None]
 """Called in the thread that has called `convert_library`; what it raises ends the run."""

@@ -14,6 +14,7 @@ import importlib
 import io
 import json
 import os
+import shutil
 import sys
 from functools import partial
 from pathlib import Path
@@ -44,6 +45,7 @@ def main() -> None:
     report["enabled_again"] = present()
     report["convert_again"] = pressed(bpy.ops.sunsplit.convert)
     report["command_line"] = command_line()
+    report["library"] = library()
     report["libraries"] = {name: sys.modules[name].__file__ for name in loaded()}
     own = {n: m for n, m in sys.modules.items() if n == MODULE or n.startswith(f"{MODULE}.")}
     report["own_modules"] = {name: module.__file__ for name, module in own.items()}
@@ -153,6 +155,20 @@ def command_line() -> dict[str, object]:
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
         status = cli.main(["convert", HDRI, "-o", str(folder), "--preview"])
     files = sorted(path.name for path in folder.iterdir())
+    return {"status": status, "files": files, "said": said.getvalue()}
+
+
+def library() -> dict[str, object]:
+    """Convert a folder: the workers are other processes, which know no extension by this name."""
+    cli = importlib.import_module(f"{MODULE}.core.cli")
+    folder, said = Path(FOLDER), io.StringIO()
+    (folder / "maps" / "inner").mkdir(parents=True)
+    shutil.copy(HDRI, folder / "maps" / "inner")
+    arguments = ["library", str(folder / "maps"), "-o", str(folder / "library"), "--json"]
+    with contextlib.redirect_stdout(said):
+        status = cli.main(arguments)
+    made = folder / "library" / "inner"
+    files = sorted(path.name for path in made.iterdir()) if made.exists() else []
     return {"status": status, "files": files, "said": said.getvalue()}
 
 

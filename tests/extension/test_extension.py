@@ -264,6 +264,13 @@ def test_command_line_of_the_extension_converts_a_file(session: dict):
     assert result["files"] == [f"{stem}.lights.json", f"{stem}.preview.png", f"{stem}.residual.exr"]
 
 
+def test_a_library_is_converted_by_workers_of_the_extension(session: dict):
+    result = session["library"]
+    assert result["status"] == 0, result["said"]
+    stem = "spruit_sunrise_1k"
+    assert result["files"] == [f"{stem}.lights.json", f"{stem}.residual.exr"]
+
+
 def test_code_and_libraries_come_from_the_zip(session: dict):
     extensions = Path(session["folder"], "user", "extensions")
     assert not session["foreign_sunsplit"]
