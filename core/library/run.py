@@ -82,6 +82,14 @@ class Planned:
         """Seconds that it takes, about."""
         return FIXED + PER_PIXEL * self.map.file.width * self.map.file.height
 
+    @property
+    def memory(self) -> int:
+        """Bytes that it takes, with its worker."""
+        file, asked = self.map.file, self.job.settings.residual_width
+        widths = [output.width or 0 for output in self.map.outputs]
+        widths += [file.width if asked == "own" else asked or 0]
+        return memory_of(file, max(widths))
+
 
 @dataclass(frozen=True)
 class LibraryPlan:
@@ -204,7 +212,7 @@ def _converted(
 ) -> Iterator[tuple[int, MapResult]]:
     """Numbers of maps, and what became of them, as they come; the largest are begun first."""
     order = sorted(left, key=lambda n: (-maps[n].weight, n))
-    tasks = {n: Task(maps[n].job.to_json(), memory_of(maps[n].map.file)) for n in order}
+    tasks = {n: Task(maps[n].job.to_json(), maps[n].memory) for n in order}
     numbers = {id(task): n for n, task in tasks.items()}
     with LocalWorkers(converter(), workers, memory) as pool:
         for done in pool.run(list(tasks.values())):

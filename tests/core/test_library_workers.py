@@ -146,11 +146,14 @@ def test_memory_that_is_used_by_itself_is_a_part_of_what_is_free():
 
 
 def test_wide_maps_take_more_memory_and_held_ones_most():
-    narrow, wide, held = (
-        memory_of(MapFile("a", width, width // 2, held, 1))
-        for width, held in ((1024, False), (16384, False), (16384, True))
+    narrow, wide, written, held = (
+        memory_of(MapFile("a", width, width // 2, held, 1), written)
+        for width, held, written in (
+            *((1024, False, 0), (16384, False, 0)),
+            *((16384, False, 16384), (16384, True, 0)),
+        )
     )
-    assert narrow < wide < held
+    assert narrow < wide < written < held
 
 
 # A master that dies
