@@ -49,12 +49,12 @@ soil or asphalt, so that such a map upside down has 4 and more. Snow and bright 
 not noticed; that a map the right way up has more than 1 takes lamps or a view from the dark."""
 
 BRIGHTER_BELOW = 1.5
-"""How many times brighter the lower half of a suspect map is as a whole, by the mean of the root of
-its luminance, in which lamps hardly count: that tells the sky from lamps that shine upwards."""
+"""How many times brighter than the upper half as a whole, by the mean of the root of its luminance,
+in which lamps hardly count, most of the lower half of a suspect map is: that tells a sky from lamps
+and soft boxes that shine upwards."""
 
-LEAST_SKY = 0.02
-"""That brightness of the lower half as a part of its mean luminance. The sky gives a tenth of the
-sun's light at least; where there is less, all comes from lamps, and they may be anywhere."""
+MOST_OF_IT = 0.5
+"""Of the lower half, to go by: its median."""
 
 MANY_REPAIRED = 0.01
 """Of all pixels: so many are said even if their light is not worth it."""
@@ -87,9 +87,10 @@ def repaired(environment: EnvironmentMap) -> str:
         )
     if part < MANY_REPAIRED and added < MUCH_REPAIRED:
         return ""
+    verb = "was" if repairs.pixels == 1 else "were"
     return (
-        f"{_pixels(repairs.pixels)} ({part:.2%}) held no light and were repaired, which adds "
-        f"{added:.2%} to all light: the map was damaged when it was made, resized or compressed."
+        f"{_pixels(repairs.pixels)} ({part:.2%}) held no light and {verb} repaired, which changed "
+        f"all light by {added:.2%}: the map was damaged when it was made, resized or compressed."
     )
 
 
@@ -166,13 +167,10 @@ def upside_down(environment: EnvironmentMap) -> str:
     above, below = (_sum(solid * np.maximum(side * up, 0), light) for side in (1, -1))
     if below <= FROM_BELOW * above:
         return ""
-    root = np.sqrt(lum, dtype=np.float64).mean(axis=1)
-    sky, ground = (
-        (_sum(solid * half, root) / _sum(solid, half)) ** 2 for half in (up < 0, up > 0)
-    )
-    half = up < 0
-    mean = _sum(solid * half, light) / _sum(solid, half)
-    if sky <= BRIGHTER_BELOW * ground or sky < LEAST_SKY * mean:
+    root = np.sqrt(lum[up > 0]).mean(axis=1)
+    ground = (_sum(solid[up > 0], root) / solid[up > 0].sum()) ** 2
+    bright = (lum[up < 0] > BRIGHTER_BELOW * ground).mean(axis=1)
+    if _sum(solid[up < 0], bright) < MOST_OF_IT * solid[up < 0].sum():
         return ""
     return (
         f"{below / (above + below):.0%} of the light on level surfaces comes from below the "
@@ -180,8 +178,8 @@ def upside_down(environment: EnvironmentMap) -> str:
     )
 
 
-def _sum(weight: Floats, values: NDArray[np.floating] | NDArray[np.bool_]) -> float:
-    return float(weighted_sum(weight, values.astype(np.float64)))
+def _sum(weight: Floats, values: Floats) -> float:
+    return float(weighted_sum(weight, values))
 
 
 def _pixels(count: int) -> str:
