@@ -197,13 +197,13 @@ def connected_groups(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int32], int]:
 
 
 def touching(indices: NDArray[np.intp], width: int, height: int) -> NDArray[np.intp]:
-    """The group, from 0, of each of a few pixels of a large map, (n,): those that touch on the
-    sphere, corners included, are of one group. indices: flat, each once."""
+    """The group, from 0, of each of a few pixels of a large map, (n,): those that share a side,
+    over the seam and the poles too, are of one group. indices: flat, each once."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     order = np.argsort(indices)
-    around = neighbours(indices, width, height, corners=True)
+    around = neighbours(indices, width, height)
     found = np.searchsorted(indices, around, sorter=order)
     there = order[np.minimum(found, len(indices) - 1)]
     first, second = np.nonzero(indices[there] == around)
