@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .files.maps import load
     from .files.samples_json import read_samples
     from .settings import ConversionSettings
+    from .suspicions import map_warnings
 
 _HOMES = {
     "Conversion": "conversion",
@@ -27,6 +28,7 @@ _HOMES = {
     "account_of_files": "files.conversion",
     "convert": "conversion",
     "load": "files.maps",
+    "map_warnings": "suspicions",
     "read_samples": "files.samples_json",
     "save": "files.conversion",
 }
@@ -39,6 +41,7 @@ __all__ = [
     "account_of_files",
     "convert",
     "load",
+    "map_warnings",
     "read_samples",
     "save",
 ]
