@@ -29,16 +29,16 @@ it was clipped. Cut at 0.8 of its peak, a blurred sun has so much, and nearly al
 deeper; one with its peak has 0.01, and with the sun's own darkening to the limb alone 0.03."""
 
 LEAST_FLAT = 5.0
-"""Pixels of the horizon's size that are flat: four are equal of any light in the middle between
-them."""
+"""Pixels of the horizon's size that are flat in one light: four are equal wherever its peak lies
+in the middle between them."""
 
 CONTRAST = 10.0
-"""How much higher than the mean of its channel a clipped light is. What is lower is a bright wall
-or cloud: no light is missed where that is flat."""
+"""How much higher than the mean of its channel a clipped light is. What is flat and lower may be a
+white wall, a cloud or the page of a book."""
 
 WIDEST = np.radians(8.0)
-"""Of what is flat. Fifteen times as wide as the sun, and wider than what glare makes of it: a soft
-box, a window or a screen, which may well be even."""
+"""Of what is flat in one light: fifteen times the sun's width. What is wider is rather a soft box, a
+window or a screen, which may well be even."""
 
 CHANNELS = ("red", "green", "blue")
 
