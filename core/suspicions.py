@@ -37,8 +37,8 @@ CONTRAST = 10.0
 white wall, a cloud or the page of a book."""
 
 WIDEST = np.radians(8.0)
-"""Of what is flat in one light: fifteen times the sun's width. What is wider is rather a soft box, a
-window or a screen, which may well be even."""
+"""Of what is flat in one light: fifteen times the sun's width. What is wider is rather a soft box,
+a window or a screen, which may well be even."""
 
 CHANNELS = ("red", "green", "blue")
 
@@ -153,10 +153,19 @@ def _plateau(
     level, bright = np.bincount(group, angle * flat), np.bincount(group, angle)
     widest = 4 * np.pi * np.sin(WIDEST / 4) ** 2
     cut = (level >= least) & (level >= FLAT * bright) & (level <= widest)
+    for one in np.flatnonzero(cut):
+        cut[one] = not _is_box(pixels[flat & (group == one)], width)
     if not cut.any():
         return None
     diameter = 4 * np.arcsin(np.sqrt(level[cut].max() / (4 * np.pi)))
     return _Plateau(int((flat & cut[group]).sum()), float(diameter), top)
+
+
+def _is_box(pixels: NDArray[np.intp], width: int) -> bool:
+    """Whether pixels fill some rows and columns, as one does that was repeated to enlarge a map, or
+    a drawn soft box; a disc leaves the corners out, except around a pole."""
+    rows, columns = (len(np.unique(part)) for part in np.divmod(pixels, width))
+    return len(pixels) == rows * columns and columns < width
 
 
 def upside_down(environment: EnvironmentMap) -> str:

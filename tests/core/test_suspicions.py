@@ -148,6 +148,12 @@ def test_an_even_disc_may_be_meant_and_the_sentence_says_so():
     assert "unless that light is even" in clipped(environment(pixels))
 
 
+@pytest.mark.parametrize("times", [2, 3, 4])
+def test_a_map_enlarged_by_repeating_its_pixels_is_not_suspected(times, sunrise):
+    pixels = load(sunrise).radiance[:, 256:-256].repeat(times, axis=0).repeat(times, axis=1)
+    assert clipped(environment(np.concatenate([pixels, pixels], axis=1))) == ""
+
+
 def test_an_overcast_sky_keeps_nothing():
     pixels = sky(2048, 1.0)
     pixels[512:] = 0.2
