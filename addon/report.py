@@ -6,6 +6,7 @@ from bpy.app.translations import pgettext_rpt as said
 
 from ..core.conversion import Conversion
 from ..core.settings import ConversionSettings
+from ..core.suspicions import map_warnings
 from .scene_needs import SceneNeeds
 
 ALL_LIGHT = 0.999
@@ -40,7 +41,7 @@ def made_sentences(conversion: Conversion) -> list[str]:
     if conversion.environment.repairs.pixels:
         repairs = conversion.environment.repairs
         lines.append(said("Repaired pixels: {repairs}").format(repairs=repairs))
-    return [*lines, *conversion.notes]
+    return [*lines, *map_warnings(conversion), *conversion.notes]
 
 
 def skipped_sentences(

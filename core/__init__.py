@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .library.options import LibraryOptions
     from .library.run import LibraryResult, convert_library
     from .settings import ConversionSettings
+    from .suspicions import map_warnings
 
 _HOMES = {
     "Conversion": "conversion",
@@ -32,6 +33,7 @@ _HOMES = {
     "convert": "conversion",
     "convert_library": "library.run",
     "load": "files.maps",
+    "map_warnings": "suspicions",
     "read_samples": "files.samples_json",
     "save": "files.conversion",
 }
@@ -47,6 +49,7 @@ __all__ = [
     "convert",
     "convert_library",
     "load",
+    "map_warnings",
     "read_samples",
     "save",
 ]

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
+from .brightest import NEAR, Brightest, brightest_of_strip, joined, nothing_kept
 from .cores import usable
 from .pixels import Pixels, Strip, copy_as_float64, highest_light, planes_of
 from .progress import Progress, silent
@@ -50,7 +51,7 @@ class Reduction:
     radiance: mean over the pixels that each stands for, weighted by solid angle, float32 (h, w, 3).
     direction: mean of their directions, weighted by luminance, (h, w, 3): as long as they agree,
     at most 1; 0 where there is no light. scalar_irradiance: of all pixels, (3,). pixels: all of
-    them, repaired; repairs: what that took.
+    them, repaired; repairs: what that took. brightest: of all pixels.
     """
 
     radiance: NDArray[np.float32]
@@ -58,15 +59,18 @@ class Reduction:
     scalar_irradiance: Floats
     pixels: RepairedPixels
     repairs: Repairs
+    brightest: Brightest
 
 
 def reduced(raw: Pixels, width: int, progress: Progress = silent) -> Reduction:
     """Narrow a map to a width that is a whole part of its own."""
     sums = _BlockSums(raw.width, raw.height, raw.width // width)
     highest, repairs, left_out = np.zeros(3, np.float32), NOTHING_REPAIRED, set()
+    bright: list[Brightest] = []
     for top, found in _on_all_cores(sums, raw, progress):
         highest = np.maximum(highest, found.highest)
         repairs += found.repairs
+        bright = [*(part for part in bright if _counts(part, highest)), found.brightest]
         if found.left_out:
             left_out.add(top)
     if left_out:  # what takes its neighbours and the highest of all to repair
@@ -75,8 +79,10 @@ def reduced(raw: Pixels, width: int, progress: Progress = silent) -> Reduction:
             if top in left_out:
                 sums.add_light(top, tuple(planes))
                 repairs += found
+                bright.append(sums.brightest(top, tuple(planes), planes.max(axis=(1, 2))))
             top += planes.shape[1]
-    return sums.reduction(RepairedPixels(raw, highest, repairs.pixels > 0), repairs)
+    pixels = RepairedPixels(raw, highest, repairs.pixels > 0)
+    return sums.reduction(pixels, repairs, joined(bright, highest))
 
 
 def narrowed(pixels: Pixels, width: int) -> NDArray[np.float32]:
@@ -128,12 +134,18 @@ def _sums_of_columns(strip: Strip, weights: Floats, step: int) -> Iterator[tuple
         yield top, out[:, :count]
 
 
+def _counts(part: Brightest, highest: NDArray[np.float32]) -> bool:
+    """Whether anything in some rows is near numbers as high as these."""
+    return bool(part.highest.max() > NEAR * highest.max())
+
+
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """Some rows: the highest finite value of each channel, what was repaired in them, and whether
-    they were left out, as that takes more than these rows."""
+    """Some rows: the highest finite value of each channel and the brightest numbers, what was
+    repaired in them, and whether they were left out, as that takes more than these rows."""
 
     highest: NDArray[np.float32]
+    brightest: Brightest
     repairs: Repairs = NOTHING_REPAIRED
     left_out: bool = False
 
@@ -169,6 +181,7 @@ class _BlockSums:
 
     def __init__(self, width: int, height: int, step: int) -> None:
         self.width, self.height, self.step = width, height, step
+        self.seen = np.zeros(3, np.float32)
         self.light = np.zeros((3, height // step, width // step))
         self.luminous = np.zeros_like(self.light[0])
         self.vector = np.zeros_like(self.light)
@@ -186,16 +199,24 @@ class _BlockSums:
         highest = np.array([highest_light(plane) for plane in strip], np.float32)
         if not np.isnan(highest).any():
             self.add_light(top, strip)
-            return _Found(highest)
+            return _Found(highest, self.brightest(top, strip, highest))
         planes = planes_of(strip)
         highest = highest_finite(planes)
         # Of halfs none is higher than what an infinite one becomes.
         halfs = all(plane.dtype == np.float16 for plane in strip)
         if np.isnan(planes).any() or not (halfs or np.isfinite(planes).all()):
-            return _Found(highest, left_out=True)
+            return _Found(highest, nothing_kept(highest), left_out=True)
         repairs = repair_planes(planes, highest, self.solid[top : top + planes.shape[1]])
         self.add_light(top, tuple(planes))
-        return _Found(highest, repairs)
+        return _Found(highest, self.brightest(top, tuple(planes), highest), repairs)
+
+    def brightest(self, top: int, strip: Strip, highest: NDArray[np.float32]) -> Brightest:
+        """Of rows that are all light; none where brighter ones were seen before, so that most of a
+        map costs nothing. Threads that see them a little later only do more."""
+        self.seen = np.maximum(self.seen, highest)
+        if highest.max() <= NEAR * self.seen.max():
+            return nothing_kept(highest)
+        return brightest_of_strip(top * self.width, strip, highest)
 
     def add_light(self, top: int, strip: Strip) -> None:
         """Add rows that are all light."""
@@ -215,7 +236,9 @@ class _BlockSums:
         in_blocks = values.reshape(*values.shape[:-2], -1, self.step, values.shape[-1])
         return np.einsum("...brw,br->...bw", in_blocks, weight.reshape(-1, self.step))
 
-    def reduction(self, pixels: RepairedPixels, repairs: Repairs) -> Reduction:
+    def reduction(
+        self, pixels: RepairedPixels, repairs: Repairs, brightest: Brightest
+    ) -> Reduction:
         """What all rows came to."""
         solid = self.solid.reshape(-1, self.step).sum(axis=1) * self.step
         azimuth, _ = sphere.centroid_angles(self.width // self.step, self.height // self.step)
@@ -227,4 +250,5 @@ class _BlockSums:
             self.light.sum(axis=(1, 2)),
             pixels,
             repairs,
+            brightest,
         )

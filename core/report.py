@@ -7,6 +7,7 @@ import numpy as np
 from .conversion import Conversion
 from .environment import LUMINANCE_WEIGHTS, EnvironmentMap
 from .files.conversion import WrittenFiles, account_of_files
+from .suspicions import map_warnings
 
 LISTED = 32
 """Suns that are listed one by one; the files hold them all."""
@@ -40,7 +41,7 @@ def _map_lines(environment: EnvironmentMap) -> list[str]:
     if environment.repairs.pixels:
         added = environment.repaired_share
         lines.append(f"repaired pixels: {environment.repairs} (light changed by {added:.3%})")
-    return lines + [f"warning: {warning}" for warning in environment.warnings]
+    return lines + [f"warning: {warning}" for warning in map_warnings(environment)]
 
 
 def _sun_lines(conversion: Conversion) -> list[str]:

@@ -196,6 +196,22 @@ def connected_groups(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int32], int]:
     return component[labels].astype(np.int32), joined - 1
 
 
+def touching(indices: NDArray[np.intp], width: int, height: int) -> NDArray[np.intp]:
+    """The group, from 0, of each of a few pixels of a large map, (n,): those that share a side,
+    over the seam and the poles too, are of one group. indices: flat, each once."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    order = np.argsort(indices)
+    around = neighbours(indices, width, height)
+    found = np.searchsorted(indices, around, sorter=order)
+    there = order[np.minimum(found, len(indices) - 1)]
+    first, second = np.nonzero(indices[there] == around)
+    pairs = first, there[first, second]
+    graph = coo_array((np.ones(len(first), bool), pairs), shape=(len(indices), len(indices)))
+    return connected_components(graph, directed=False)[1].astype(np.intp)
+
+
 def group_pixels(labels: NDArray[np.int32], count: int) -> list[NDArray[np.intp]]:
     """Flat indices, rising, of the pixels of each label from 1 to count."""
     if not count:

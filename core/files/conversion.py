@@ -11,6 +11,7 @@ import numpy as np
 from ..account import Account
 from ..conversion import Conversion
 from ..errors import UnusableInput
+from ..suspicions import map_warnings
 from . import exr, lights_json, samples_json
 from .atomic import written_together
 from .belonging import read_named, read_together, sha256
@@ -135,7 +136,7 @@ def describe(conversion: Conversion) -> dict[str, Any]:
             "shadow_edges_percent": 100 * conversion.predicted_error,
             "level_ground_percent": 100 * conversion.ground_error,
         },
-        "notes": [*environment.warnings, *conversion.notes],
+        "notes": [*map_warnings(environment), *conversion.notes],
     }
 
 

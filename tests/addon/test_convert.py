@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from sunsplit.core import ConversionSettings, convert, load
+from sunsplit.core import ConversionSettings, convert, load, map_warnings
 from tests.blender import (
     add_mapping,
     empty_world,
@@ -67,6 +67,21 @@ def test_the_operator_gives_what_the_function_gives(scene, sunrise):
         assert irradiance == pytest.approx(sun.irradiance, rel=1e-6)
         assert to_light(lamp) == pytest.approx(sun.to_light, abs=1e-6)
         assert lamp.data.angle == pytest.approx(sun.angular_diameter, rel=1e-6)
+
+
+def test_the_panel_says_once_what_is_odd_about_a_map(scene, tmp_path, sunrise):
+    pixels = sky(256, 0.4)
+    paint_disc(pixels, direction(40, 30), 3, 900)
+    flat = write_map(tmp_path / "flat.exr", pixels)
+    hdri_world(scene, flat)
+    bpy.ops.sunsplit.convert()
+    sentences = scene.sunsplit.report.splitlines()
+    expected = map_warnings(load(flat))
+    assert "are flat at" in expected[0]
+    assert [line for line in sentences if line in expected] == list(expected)
+    hdri_world(scene, sunrise)
+    bpy.ops.sunsplit.convert()
+    assert "are flat at" not in scene.sunsplit.report
 
 
 def test_the_residual_in_the_world_is_the_functions(scene, sunrise):
