@@ -1,0 +1,80 @@
+"""What the report of a library does in a browser, sort and search: JavaScript, as text because an
+extension ships only modules. No word of the page comes from it but the count of rows."""
+
+SCRIPT = """
+"use strict";
+const table = document.querySelector("table");
+const body = table.tBodies[0];
+const heads = [...table.querySelectorAll("th[data-kind]")];
+const search = document.getElementById("search");
+const shown = document.getElementById("shown");
+const nothing = document.getElementById("nothing");
+const choices = [...document.querySelectorAll("button[data-choice]")];
+const rows = [...body.rows].map((element, place) => ({element, place}));
+const order = new Intl.Collator("en", {numeric: true, sensitivity: "base"});
+let choice = "all";
+
+function value(row, column, kind) {
+  const cell = row.element.cells[column];
+  if (kind === "text") return cell.dataset.v ?? cell.textContent;
+  return cell.dataset.v === undefined ? null : Number(cell.dataset.v);
+}
+
+// Rows without a figure come last, whichever way; equal ones in the order of the library.
+function sort(head, direction) {
+  const kind = head.dataset.kind, column = head.cellIndex;
+  for (const row of rows) row.value = value(row, column, kind);
+  const sign = direction === "ascending" ? 1 : -1;
+  rows.sort((a, b) => {
+    if (a.value === null || b.value === null)
+      return (a.value === null) - (b.value === null) || a.place - b.place;
+    const step = kind === "text" ? order.compare(a.value, b.value) : a.value - b.value;
+    return sign * step || a.place - b.place;
+  });
+  for (const other of heads) other.removeAttribute("aria-sort");
+  head.setAttribute("aria-sort", direction);
+  const sorted = document.createDocumentFragment();
+  for (const row of rows) sorted.append(row.element);
+  body.append(sorted);
+  const bar = table.tHead.getBoundingClientRect();
+  if (body.getBoundingClientRect().top < bar.bottom)
+    window.scrollBy(0, body.getBoundingClientRect().top - bar.bottom);
+}
+
+for (const head of heads) {
+  head.querySelector("button").addEventListener("click", () => {
+    const first = head.dataset.kind === "text" ? "ascending" : "descending";
+    const second = first === "ascending" ? "descending" : "ascending";
+    sort(head, head.getAttribute("aria-sort") === first ? second : first);
+  });
+}
+
+// Every word must be in the row, in any order and any case.
+function filter() {
+  const words = search.value.toLowerCase().split(/\\s+/).filter(Boolean);
+  let count = 0;
+  for (const row of rows) {
+    row.text ??= row.element.textContent.toLowerCase();
+    const kinds = row.element.className;
+    const wanted = (choice === "all" || kinds.includes(choice))
+      && words.every(word => row.text.includes(word));
+    row.element.hidden = !wanted;
+    count += wanted;
+  }
+  shown.textContent = count === rows.length ? "" :
+    `${count.toLocaleString("en")} of ${rows.length.toLocaleString("en")} shown`;
+  nothing.hidden = count > 0 || rows.length === 0;
+}
+
+search.addEventListener("input", filter);
+for (const button of choices) {
+  button.addEventListener("click", () => {
+    choice = button.dataset.choice;
+    for (const other of choices) other.setAttribute("aria-pressed", String(other === button));
+    filter();
+  });
+}
+document.querySelector(".bar").hidden = false;
+// A browser that comes back to the page may keep what was typed.
+if (search.value) filter();
+"""
