@@ -6,6 +6,7 @@ import csv
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
+from typing import TextIO
 
 from ..files.atomic import written_together
 from .records import Row
@@ -13,9 +14,7 @@ from .report_page import page, readable
 
 HTML, CSV = "report.html", "report.csv"
 
-RESULTS = frozenset(
-    {"lights", "share", "predicted_error", "ground_error", "account_error"},
-)
+RESULTS = {"lights", "share", "predicted_error", "ground_error", "account_error"}
 """Figures that only a conversion has."""
 
 FORMULAS = ("=", "+", "-", "@", "\t", "\r")
@@ -33,12 +32,13 @@ def write_report(folder: Path, rows: Sequence[Row], title: str) -> tuple[Path, P
             file.writelines(page(rows, title, CSV))
         # With a byte order mark: without it, Excel reads no UTF-8.
         with table.open("w", encoding="utf-8-sig", newline="") as file:
-            _write_csv(csv.writer(file), rows)
+            _write_csv(file, rows)
     return folder / HTML, folder / CSV
 
 
-def _write_csv(writer: csv.Writer, rows: Sequence[Row]) -> None:
+def _write_csv(file: TextIO, rows: Sequence[Row]) -> None:
     """All of the rows but the pictures, as RFC 4180 says."""
+    writer = csv.writer(file)
     names = [field.name for field in fields(Row) if field.name != "thumbnail"]
     writer.writerow(names)
     for row in rows:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import os
+import re
 from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import PurePosixPath
@@ -19,19 +20,22 @@ from .records import Row
 from .report_script import SCRIPT
 from .report_style import STYLE
 
+UP, DOWN = "ascending", "descending"
+
 COLUMNS = (
-    ("Map", "text", "map", "Folder and name of the map"),
-    ("Status", "text", "status", "Whether there is a conversion"),
-    ("Suns", "number", "n", "How many lights"),
-    ("Light in suns", "number", "n", "Part of all light that is in suns"),
-    ("Predicted error", "number", "n", "What shadows of the suns are wrong by, in the mean"),
-    ("Ground error", "number", "n", "What level ground in the open is wrong by"),
-    ("Account", "number", "n", "What suns and residual map together miss of the light, as a part"),
-    ("Size", "number", "n", "Width and height of the map in pixels"),
-    ("Time", "number", "n", "Seconds of work, without waiting"),
-    ("Warnings", "number", "notes", "How many; and why there is no conversion"),
+    ("Map", UP, "map", "Folder and name of the map"),
+    ("Status", DOWN, "status", "Whether there is a conversion"),
+    ("Suns", DOWN, "n", "How many lights"),
+    ("Light in suns", DOWN, "n", "Part of all light that is in suns"),
+    ("Predicted error", DOWN, "n", "What shadows of the suns are wrong by, in the mean"),
+    ("Ground error", DOWN, "n", "What level ground in the open is wrong by"),
+    ("Account", DOWN, "n", "Part of the light that suns and residual map together miss"),
+    ("Size", DOWN, "n", "Width and height of the map in pixels"),
+    ("Time", DOWN, "n", "Seconds of work, without waiting"),
+    ("Warnings", DOWN, "notes", "How many; and why there is no conversion"),
 )
-"""Of the table, behind the picture: name, what is sorted, CSS class, explanation."""
+"""Of the table, behind the picture: name, which way the first click sorts, CSS class, explanation.
+What is sorted is a number in each cell: what an artist looks for, the worst, comes first."""
 
 KINDS = {
     "lights.json": "lights",
@@ -54,8 +58,10 @@ def page(rows: Sequence[Row], title: str, csv: str) -> Iterator[str]:
     )
     yield f'<div class="report"><table role="table" aria-label="Maps">\n{_table_head()}'
     yield '<tbody role="rowgroup">\n'
-    for row in rows:
-        yield _row(row)
+    by_name = sorted(range(len(rows)), key=lambda n: in_words(rows[n].source))
+    places = {n: place for place, n in enumerate(by_name)}
+    for n, row in enumerate(rows):
+        yield _row(row, places[n])
     empty = "" if not rows else " hidden"
     words = "No map matches." if rows else "There are no maps in this library."
     yield f'</tbody></table></div>\n<p class="nothing" id="nothing"{empty}>{words}</p>\n'
@@ -65,6 +71,13 @@ def page(rows: Sequence[Row], title: str, csv: str) -> Iterator[str]:
 def readable(name: str) -> str:
     """Text that can be written as UTF-8: bytes of a file's name that are none become \\udc80."""
     return name.encode("utf-8", "backslashreplace").decode()
+
+
+def in_words(name: str) -> list[str | int]:
+    """What to sort names by: without case, and sky_9 before sky_10."""
+    parts: list[str | int] = list(re.split("([0-9]+)", name.casefold()))
+    parts[1::2] = map(int, parts[1::2])
+    return parts
 
 
 def link(path: str) -> str:
@@ -139,22 +152,23 @@ def _bar(rows: Sequence[Row]) -> str:
 
 def _table_head() -> str:
     cells = "".join(
-        f'<th role="columnheader" scope="col" class="{look}" data-kind="{kind}">'
+        f'<th role="columnheader" scope="col" class="{look}" data-first="{first}">'
         f'<button type="button" title="{escape(explained)}">{name}</button></th>'
-        for name, kind, look, explained in COLUMNS
+        for name, first, look, explained in COLUMNS
     )
     picture = '<th role="columnheader" scope="col" aria-label="Picture"></th>'
     return f'<thead role="rowgroup"><tr role="row">{picture}{cells}</tr></thead>\n'
 
 
-def _row(row: Row) -> str:
+def _row(row: Row, place: int) -> str:
+    """place: of its name among all."""
     kinds = [row.status] + ["warned"] * bool(row.warnings)
-    cells = [_picture(row), _map(row), *_figures(row), _notes(row)]
+    cells = [_picture(row), _map(row, place), *_figures(row), _notes(row)]
     return f'<tr role="row" class="{" ".join(kinds)}">{"".join(cells)}</tr>\n'
 
 
-def _cell(look: str, content: str, sorted_by: object = None) -> str:
-    value = "" if sorted_by is None else f' data-v="{escape(str(sorted_by))}"'
+def _cell(look: str, content: str, sorted_by: float | None = None) -> str:
+    value = "" if sorted_by is None else f' data-v="{sorted_by:.17g}"'
     return f'<td role="cell" class="{look}"{value}>{content}</td>'
 
 
@@ -172,14 +186,12 @@ def _picture(row: Row) -> str:
     return _cell("picture", image)
 
 
-def _map(row: Row) -> str:
+def _map(row: Row, place: int) -> str:
     path = PurePosixPath(row.source)
     lines = [f"<b>{escape(readable(path.name))}</b>"]
     about = [
         "" if path.parent == PurePosixPath() else f"in {path.parent}",
-        f"instead of {', '.join(PurePosixPath(other).name for other in row.variants)}"
-        if row.variants
-        else "",
+        f"other sizes: {', '.join(row.variants)}" if row.variants else "",
         f"by {row.author}" if row.author else "",
         f"licence: {row.licence}" if row.licence else "",
     ]
@@ -187,7 +199,7 @@ def _map(row: Row) -> str:
     if row.files:
         links = "".join(f'<a href="{link(f)}">{_kind(f)}</a>' for f in row.files)
         lines.append(f'<span class="files">{links}</span>')
-    return _cell("map", "".join(lines), readable(row.source))
+    return _cell("map", "".join(lines), place)
 
 
 def _kind(file: str) -> str:
@@ -209,8 +221,8 @@ def _figures(row: Row) -> list[str]:
         figures = [('<span class="dim">–</span>', None)] * len(figures)
     figures.append((size, row.width * row.height or None))
     figures.append((f"{row.seconds:.1f} s", row.seconds))
-    status = {"done": "converted", "failed": "failed"}[row.status]
-    return [_cell("status", status), *(_cell("n", *figure) for figure in figures)]
+    status = ("failed", 1) if row.status == "failed" else ("converted", 0)
+    return [_cell("status", *status), *(_cell("n", *figure) for figure in figures)]
 
 
 def _percent(part: float) -> str:

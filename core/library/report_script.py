@@ -5,45 +5,33 @@ SCRIPT = """
 "use strict";
 const table = document.querySelector("table");
 const body = table.tBodies[0];
-const heads = [...table.querySelectorAll("th[data-kind]")];
+const heads = [...table.querySelectorAll("th[data-first]")];
 const search = document.getElementById("search");
 const shown = document.getElementById("shown");
 const nothing = document.getElementById("nothing");
 const choices = [...document.querySelectorAll("button[data-choice]")];
 const rows = [...body.rows].map((element, place) => ({element, place}));
-const order = new Intl.Collator("en", {numeric: true, sensitivity: "base"});
 let choice = "all";
-
-function value(row, column, kind) {
-  const cell = row.element.cells[column];
-  if (kind === "text") return cell.dataset.v ?? cell.textContent;
-  return cell.dataset.v === undefined ? null : Number(cell.dataset.v);
-}
 
 // Rows without a figure come last, whichever way; equal ones in the order of the library.
 function sort(head, direction) {
-  const kind = head.dataset.kind, column = head.cellIndex;
-  for (const row of rows) row.value = value(row, column, kind);
+  const column = head.cellIndex;
   const sign = direction === "ascending" ? 1 : -1;
-  rows.sort((a, b) => {
-    if (a.value === null || b.value === null)
-      return (a.value === null) - (b.value === null) || a.place - b.place;
-    const step = kind === "text" ? order.compare(a.value, b.value) : a.value - b.value;
-    return sign * step || a.place - b.place;
-  });
+  for (const row of rows) {
+    const value = row.element.cells[column].dataset.v;
+    row.key = value === undefined ? Infinity : sign * Number(value);
+  }
+  rows.sort((a, b) => a.key < b.key ? -1 : a.key > b.key ? 1 : a.place - b.place);
   for (const other of heads) other.removeAttribute("aria-sort");
   head.setAttribute("aria-sort", direction);
-  const sorted = document.createDocumentFragment();
-  for (const row of rows) sorted.append(row.element);
-  body.append(sorted);
-  const bar = table.tHead.getBoundingClientRect();
-  if (body.getBoundingClientRect().top < bar.bottom)
-    window.scrollBy(0, body.getBoundingClientRect().top - bar.bottom);
+  body.append(...rows.map(row => row.element));
+  const gap = body.getBoundingClientRect().top - table.tHead.getBoundingClientRect().bottom;
+  if (gap < 0) window.scrollBy(0, gap);
 }
 
 for (const head of heads) {
   head.querySelector("button").addEventListener("click", () => {
-    const first = head.dataset.kind === "text" ? "ascending" : "descending";
+    const first = head.dataset.first;
     const second = first === "ascending" ? "descending" : "ascending";
     sort(head, head.getAttribute("aria-sort") === first ? second : first);
   });

@@ -65,9 +65,10 @@ thead button {
   font-weight: 600; line-height: 1.2; cursor: pointer;
 }
 thead button:hover { color: var(--accent); }
-thead button::after { content: " \\2195"; color: var(--soft); opacity: 0.5; }
-[aria-sort=ascending] button::after { content: " \\25B2"; color: var(--accent); opacity: 1; }
-[aria-sort=descending] button::after { content: " \\25BC"; color: var(--accent); opacity: 1; }
+/* The arrows are not read aloud: aria-sort is. */
+thead button::after { content: " \\2195" / ""; color: var(--soft); opacity: 0.5; }
+[aria-sort=ascending] button::after { content: " \\25B2" / ""; color: var(--accent); opacity: 1; }
+[aria-sort=descending] button::after { content: " \\25BC" / ""; color: var(--accent); opacity: 1; }
 
 /* A row that is not on the screen is neither laid out nor painted, nor its picture decoded. */
 tbody { overflow-anchor: none; }
@@ -99,7 +100,8 @@ tbody tr.failed { background: var(--bad-paper); }
 @media (max-width: 1180px) {
   tr {
     column-gap: 0.75rem; padding-inline: 1rem;
-    grid-template-columns: 128px minmax(7rem, 1fr) 4.75rem 2.75rem 4rem 4.5rem 4rem 3.5rem 5rem 3.5rem;
+    grid-template-columns:
+      128px minmax(7rem, 1fr) 4.75rem 2.75rem 4rem 4.5rem 4rem 3.5rem 5rem 3.5rem;
   }
   .notes { grid-column: 2 / -1; }
   thead .notes button { width: auto; }

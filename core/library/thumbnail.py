@@ -76,7 +76,8 @@ def _circle(sun: Sun) -> list[Line]:
     u, v = (float(place) for place in sphere.to_image(sun.to_light))
     rim = LEAST_RADIUS * FINE * RING
     # What leaves at the seam comes back.
-    return [(rim + ((u + turn) * width, v * height)).ravel().tolist() for turn in (-1, 0, 1)]
+    centres = np.array([((u + turn) * width, v * height) for turn in (-1, 0, 1)])
+    return [(rim + centre).ravel().tolist() for centre in centres]
 
 
 def _mask(lines: list[Line], wide: int) -> Image.Image:

@@ -1,0 +1,229 @@
+"""How long a report of many maps takes to open in Chromium, to sort and to search.
+
+    .venv-5.2/bin/python -m tests.benchmarks.library_report [--rows 2000] [--opens 5] [-o FOLDER]
+    .venv-5.2/bin/python -m tests.benchmarks.library_report --picture docs/library-report.png
+
+The maps are the sunrise and those of Blender's studio lights (CC0), converted; a report of more
+rows has the same pictures turned, so that no two are alike and none is decoded for another.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import io
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import distribution
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+from PIL import Image
+from playwright.sync_api import Browser, Page
+
+from sunsplit.core.conversion import convert
+from sunsplit.core.errors import UnusableInput
+from sunsplit.core.files.conversion import save
+from sunsplit.core.files.maps import load
+from sunsplit.core.library.records import Row
+from sunsplit.core.library.report import write_report
+from sunsplit.core.library.thumbnail import QUALITY, thumbnail
+from tests.browser import browser
+
+SUNRISE = Path(__file__).parents[2] / "sample_scenes" / "spruit_sunrise_1k.hdr"
+
+OPEN, ACT = 2000, 200
+"""What is to be reached, in milliseconds."""
+
+COLUMNS = ("Map", "Status", "Suns", "Predicted error", "Size", "Warnings")
+WORDS = ("sunset", "folder_07 forest", "failed")
+
+PAINTED = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+FIRST_PICTURE = f"document.querySelector('tbody img').decode().then(() => {PAINTED})"
+
+
+@dataclass(frozen=True)
+class Result:
+    """Milliseconds, once for each time. bar: what the median should stay below."""
+
+    what: str
+    times: Sequence[float]
+    bar: float | None = None
+
+
+def studio_lights() -> list[Path]:
+    """The maps that Blender brings along."""
+    return sorted(
+        Path(str(distribution("bpy").locate_file("bpy"))).glob("*/datafiles/*/world/*.exr")
+    )
+
+
+def row_of(path: Path, folder: Path, **about: str) -> Row:
+    """A map, converted into a folder."""
+    start = time.perf_counter()
+    source = f"{path.parent.name}/{path.name}"
+    try:
+        environment = load(path)
+        conversion = convert(environment)
+    except UnusableInput as error:
+        return Row(source, "failed", str(error), seconds=time.perf_counter() - start)
+    files = save(conversion, folder / path.parent.name, preview=True)
+    return Row(
+        source=source,
+        status="done",
+        width=environment.own_width,
+        height=environment.own_height,
+        lights=len(conversion.suns),
+        share=conversion.account.share,
+        predicted_error=conversion.predicted_error,
+        ground_error=conversion.ground_error,
+        account_error=float(conversion.account.relative_error.max()),
+        seconds=time.perf_counter() - start,
+        warnings=(*environment.warnings, *conversion.notes),
+        files=tuple(
+            written.relative_to(folder).as_posix()
+            for written in (files.preview, files.residual, files.lights)
+            if written
+        ),
+        thumbnail=base64.b64encode(thumbnail(conversion)).decode(),
+        **about,
+    )
+
+
+def many(rows: Sequence[Row], count: int) -> list[Row]:
+    """So many rows of these, in folders of a hundred; each 50th has failed, each 9th a warning."""
+    found = []
+    for n in range(count):
+        row = rows[n % len(rows)]
+        source = f"folder_{n // 100:02}/{Path(row.source).stem}_{n:05}.exr"
+        if n % 50 == 49:
+            sentence = f"{source} is 4096 x 2049, not 2:1."
+            found.append(Row(source, "failed", sentence, seconds=0.1))
+            continue
+        warnings = ("The sun is clipped: its brightest pixels are alike.",) if n % 9 == 0 else ()
+        found.append(
+            replace(
+                row,
+                source=source,
+                warnings=warnings,
+                predicted_error=row.predicted_error * (1 + n / count),
+                thumbnail=turned(row.thumbnail, n),
+            )
+        )
+    return found
+
+
+def turned(picture: str, columns: int) -> str:
+    """The same JPEG in base64, turned about the zenith."""
+    pixels = np.asarray(Image.open(io.BytesIO(base64.b64decode(picture))))
+    out = io.BytesIO()
+    Image.fromarray(np.roll(pixels, columns, axis=1)).save(out, "JPEG", quality=QUALITY)
+    return base64.b64encode(out.getvalue()).decode()
+
+
+def measure(opened: Browser, report: Path, opens: int) -> list[Result]:
+    """All figures of a report. Each time it is opened in a fresh profile."""
+    loads, pictures = [], []
+    acts: dict[str, list[float]] = {}
+    for _ in range(opens):
+        context = opened.new_context(viewport={"width": 1400, "height": 900})
+        page = context.new_page()
+        start = time.perf_counter()
+        page.goto(report.as_uri())
+        loads.append(1e3 * (time.perf_counter() - start))
+        page.evaluate(FIRST_PICTURE)
+        pictures.append(1e3 * (time.perf_counter() - start))
+        for name in COLUMNS:
+            acts.setdefault(f"sort by {name}", []).append(sorted_in(page, name))
+        for word in WORDS:
+            acts.setdefault(f"search {word!r}", []).append(searched_in(page, word))
+        acts.setdefault("search, all again", []).append(searched_in(page, ""))
+        context.close()
+    return [
+        Result("open, until the event `load`", loads, OPEN),
+        Result("open, until the first pictures are on the screen", pictures, OPEN),
+        *(Result(what, times, ACT) for what, times in acts.items()),
+    ]
+
+
+def sorted_in(page: Page, name: str) -> float:
+    """Milliseconds from a click on a header until the new order is on the screen."""
+    button = page.get_by_role("columnheader", name=name, exact=True).get_by_role("button")
+    return button.evaluate(
+        "async button => { const start = performance.now(); button.click();"
+        f"await {PAINTED}; return performance.now() - start; }}"
+    )
+
+
+def searched_in(page: Page, words: str) -> float:
+    """Milliseconds from the last key until what matches is on the screen."""
+    return page.locator("#search").evaluate(
+        "async (field, words) => { const start = performance.now(); field.value = words;"
+        "field.dispatchEvent(new Event('input', {bubbles: true}));"
+        f"await {PAINTED}; return performance.now() - start; }}",
+        words,
+    )
+
+
+def table(results: Sequence[Result], rows: int, megabytes: float, version: str) -> str:
+    lines = [
+        f"# A library's report of {rows:,} maps in a browser",
+        "",
+        f"Chromium {version} without a window or a GPU; the page has {megabytes:.1f} MB. "
+        "Milliseconds, until what is asked for is on the screen.",
+        "",
+        "| what | median | largest | to be below |",
+        "| --- | --- | --- | --- |",
+    ]
+    for one in results:
+        bar = "" if one.bar is None else f"{one.bar:g}"
+        lines.append(f"| {one.what} | {median(one.times):.0f} | {max(one.times):.0f} | {bar} |")
+    return "\n".join(lines) + "\n"
+
+
+def take_picture(opened: Browser, report: Path, path: Path, width: int, dark: bool) -> None:
+    """A report as it looks in a window."""
+    page = opened.new_page(
+        viewport={"width": width, "height": 900}, color_scheme="dark" if dark else "light"
+    )
+    page.goto(report.as_uri())
+    page.evaluate(FIRST_PICTURE)
+    picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    page.close()
+    # Of 128 colours it has a third of the size, and looks the same.
+    picture.quantize(128, Image.Quantize.MEDIANCUT).save(path, optimize=True)
+
+
+def main(arguments: Sequence[str] | None = None) -> list[Result]:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("maps", nargs="*", type=Path, metavar="MAP.hdr")
+    parser.add_argument("-o", "--output", type=Path, default=Path("out"), metavar="FOLDER")
+    parser.add_argument("--rows", type=int, default=2000)
+    parser.add_argument("--opens", type=int, default=5)
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="of the maps' own report")
+    parser.add_argument("--width", type=int, default=1400, help="of the picture")
+    parser.add_argument("--dark", action="store_true", help="the picture")
+    chosen = parser.parse_args(arguments)
+    maps = chosen.maps or [SUNRISE, *studio_lights()]
+    with tempfile.TemporaryDirectory() as name, browser() as opened:
+        folder = Path(name)
+        rows = [row_of(path, folder) for path in maps]
+        if chosen.picture:
+            report, _ = write_report(folder, rows, "World maps")
+            take_picture(opened, report, chosen.picture, chosen.width, chosen.dark)
+            return []
+        rows = many(rows, chosen.rows)
+        report, _ = write_report(folder, rows, f"{chosen.rows:,} maps")
+        results = measure(opened, report, chosen.opens)
+        text = table(results, len(rows), report.stat().st_size / 1e6, opened.version)
+    chosen.output.mkdir(parents=True, exist_ok=True)
+    (chosen.output / "library_report.md").write_text(text, encoding="utf-8")
+    print(text)
+    return results
+
+
+if __name__ == "__main__":
+    main()
