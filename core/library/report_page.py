@@ -30,7 +30,7 @@ COLUMNS = (
     ("Predicted error", DOWN, "n", "What shadows of the suns are wrong by, in the mean"),
     ("Ground error", DOWN, "n", "What level ground in the open is wrong by"),
     ("Account", DOWN, "n", "Part of the light that suns and residual map together miss"),
-    ("Size", DOWN, "n", "Width and height of the map in pixels"),
+    ("Size", DOWN, "n size", "Width and height of the map in pixels"),
     ("Time", DOWN, "n", "Seconds of work, without waiting"),
     ("Warnings", DOWN, "notes", "How many; and why there is no conversion"),
 )
@@ -178,7 +178,7 @@ def _picture(row: Row) -> str:
     name = escape(readable(PurePosixPath(row.source).name))
     image = (
         f'<img src="data:image/jpeg;base64,{escape(row.thumbnail)}" width="192" height="96" '
-        f'loading="lazy" decoding="async" alt="{name} with its suns marked">'
+        f'decoding="async" alt="{name} with its suns marked">'
     )
     preview = next((f for f in row.files if f.endswith("." + ENDINGS["preview"])), None)
     if preview:
@@ -189,11 +189,11 @@ def _picture(row: Row) -> str:
 def _map(row: Row, place: int) -> str:
     path = PurePosixPath(row.source)
     lines = [f"<b>{escape(readable(path.name))}</b>"]
+    whose = [f"by {row.author}"] * bool(row.author) + [row.licence] * bool(row.licence)
     about = [
         "" if path.parent == PurePosixPath() else f"in {path.parent}",
         f"other sizes: {', '.join(row.variants)}" if row.variants else "",
-        f"by {row.author}" if row.author else "",
-        f"licence: {row.licence}" if row.licence else "",
+        " · ".join(whose),
     ]
     lines += [f"<small>{escape(readable(line))}</small>" for line in about if line]
     if row.files:
@@ -209,7 +209,7 @@ def _kind(file: str) -> str:
 
 
 def _figures(row: Row) -> list[str]:
-    size = f"{row.width} × {row.height}" if row.width else ""
+    size = f"{row.width}\N{NO-BREAK SPACE}× {row.height}" if row.width else ""
     figures = [
         (f"{row.lights:,}", row.lights),
         (f"{row.share:.1%}", row.share),
@@ -219,10 +219,12 @@ def _figures(row: Row) -> list[str]:
     ]
     if row.status == "failed":  # there are none: 0 would look like a result
         figures = [('<span class="dim">–</span>', None)] * len(figures)
-    figures.append((size, row.width * row.height or None))
-    figures.append((f"{row.seconds:.1f} s", row.seconds))
-    status = ("failed", 1) if row.status == "failed" else ("converted", 0)
-    return [_cell("status", *status), *(_cell("n", *figure) for figure in figures)]
+    return [
+        _cell("status", *(("failed", 1) if row.status == "failed" else ("converted", 0))),
+        *(_cell("n", *figure) for figure in figures),
+        _cell("n size", size, row.width * row.height or None),
+        _cell("n", f"{row.seconds:.1f} s", row.seconds),
+    ]
 
 
 def _percent(part: float) -> str:

@@ -49,10 +49,10 @@ button, input { font: inherit; color: inherit; }
 
 table, thead, tbody { display: block; }
 tr {
-  display: grid; column-gap: 1rem; padding: 0.5rem 1.5rem; align-items: start;
+  display: grid; column-gap: 0.875rem; padding: 0.5rem 1.5rem; align-items: start;
   grid-template-columns:
-    192px minmax(9rem, 5fr) 5.25rem 3.25rem 4.75rem 5rem 4.75rem 4.5rem 5.75rem 4.25rem
-    minmax(9rem, 6fr);
+    192px minmax(9rem, 1fr) 4.75rem 3.75rem 4.5rem 5.5rem 4.5rem 5.25rem 5.5rem 4.25rem
+    minmax(9rem, 1fr);
 }
 th, td { display: block; min-width: 0; padding: 0; text-align: left; font-weight: normal; }
 thead {
@@ -61,14 +61,15 @@ thead {
 }
 thead tr { padding-block: 0.25rem; align-items: end; }
 thead button {
-  width: 100%; padding: 0.25rem 0; border: 0; background: none; text-align: inherit;
-  font-weight: 600; line-height: 1.2; cursor: pointer;
+  width: 100%; padding: 0.25rem 0; border: 0; background: none; cursor: pointer;
+  text-align: inherit; white-space: normal; font-weight: 600; line-height: 1.2;
 }
 thead button:hover { color: var(--accent); }
 /* The arrows are not read aloud: aria-sort is. */
-thead button::after { content: " \\2195" / ""; color: var(--soft); opacity: 0.5; }
-[aria-sort=ascending] button::after { content: " \\25B2" / ""; color: var(--accent); opacity: 1; }
-[aria-sort=descending] button::after { content: " \\25BC" / ""; color: var(--accent); opacity: 1; }
+thead button::after { content: "\\A0\\2195" / ""; color: var(--soft); opacity: 0.5; }
+[aria-sort] button::after { color: var(--accent); opacity: 1; }
+[aria-sort=ascending] button::after { content: "\\A0\\25B2" / ""; }
+[aria-sort=descending] button::after { content: "\\A0\\25BC" / ""; }
 
 /* A row that is not on the screen is neither laid out nor painted, nor its picture decoded. */
 tbody { overflow-anchor: none; }
@@ -78,8 +79,9 @@ tbody tr {
 }
 tbody tr:hover { background: var(--hover); }
 tbody tr.failed { background: var(--bad-paper); }
-.n { text-align: right; font-variant-numeric: tabular-nums; }
-.picture img { display: block; width: 100%; aspect-ratio: 2; border-radius: 4px; }
+.n { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
+.size { white-space: normal; }
+.picture img { display: block; width: 100%; height: auto; aspect-ratio: 2; border-radius: 4px; }
 .picture .none {
   display: grid; place-items: center; aspect-ratio: 2; border-radius: 4px;
   border: 1px dashed var(--line); color: var(--soft);
@@ -87,7 +89,7 @@ tbody tr.failed { background: var(--bad-paper); }
 .map, .notes { overflow-wrap: anywhere; white-space: pre-wrap; }
 .map b { font-weight: 600; }
 .map small, .files { display: block; font-size: 0.8125rem; color: var(--soft); }
-.files a { margin-right: 0.75em; }
+.files a { display: inline-block; margin-right: 0.75em; }
 .notes p { margin: 0 0 0.25rem; color: var(--care); }
 .notes p.sentence { color: var(--bad); }
 .failed .status { color: var(--bad); font-weight: 600; }
@@ -97,20 +99,28 @@ tbody tr.failed { background: var(--bad-paper); }
   border-radius: 6px; }
 
 /* Narrower: what there is to say goes below the figures. */
-@media (max-width: 1180px) {
+@media (max-width: 1300px) {
   tr {
     column-gap: 0.75rem; padding-inline: 1rem;
     grid-template-columns:
-      128px minmax(7rem, 1fr) 4.75rem 2.75rem 4rem 4.5rem 4rem 3.5rem 5rem 3.5rem;
+      144px minmax(8rem, 1fr) 4.75rem 3.5rem 4rem 5.5rem 4rem 4.75rem 3.75rem 3.25rem;
   }
-  .notes { grid-column: 2 / -1; }
+  .notes { grid-column: 2 / -1; padding-top: 0.25rem; }
   thead .notes button { width: auto; }
   .picture { grid-row: span 2; }
   header, .bar { padding-inline: 1rem; }
+  th:not([aria-sort]) button::after { content: none; }
 }
-@media (max-width: 780px) {
+@media (max-width: 940px) {
+  tr {
+    column-gap: 0.625rem;
+    grid-template-columns: 112px minmax(8rem, 1fr) 3.25rem 4rem 5rem 3.75rem 4rem 3.75rem 3rem;
+  }
+  .status { display: none; }
+}
+@media (max-width: 790px) {
   .report { overflow-x: auto; }
-  table { min-width: 740px; }
+  table { min-width: 790px; }
   thead { position: static; }
   .bar { height: auto; padding-block: 0.5rem; flex-wrap: wrap; position: static; }
 }

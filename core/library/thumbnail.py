@@ -23,7 +23,8 @@ MARKED = 32
 LEAST_RADIUS = 3.5
 """Pixels of a circle, so that it is seen: the sun itself is a seventh of a pixel wide."""
 
-QUALITY = 70
+JPEG = {"quality": 60, "subsampling": 0, "optimize": True}
+"""Colours as fine as brightness: else the yellow of a circle runs into its surroundings."""
 
 FINE = 2
 """Circles are drawn so many times as large and then reduced: their lines become smooth."""
@@ -36,14 +37,14 @@ Line = list[float]
 
 
 def thumbnail(conversion: Conversion) -> bytes:
-    """A JPEG of WIDTH x HEIGHT pixels, about 4 KB; the same bytes for the same conversion."""
+    """A JPEG of WIDTH x HEIGHT pixels, about 5 KB; the same bytes for the same conversion."""
     picture = Image.fromarray(tone_mapped(_small(conversion.environment.radiance)))
     lines = [line for sun in conversion.suns[:MARKED] for line in _circle(sun)]
     # A dark rim first: yellow lines on a yellow sky would not be seen.
     picture.paste(PAPER, mask=_mask(lines, 5))
     picture.paste(SUN, mask=_mask(lines, 2))
     out = io.BytesIO()
-    picture.save(out, "JPEG", quality=QUALITY, optimize=True)
+    picture.save(out, "JPEG", **JPEG)
     return out.getvalue()
 
 
