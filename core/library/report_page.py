@@ -32,7 +32,7 @@ COLUMNS = (
     ("Account", DOWN, "n", "Part of the light that suns and residual map together miss"),
     ("Size", DOWN, "n size", "Width and height of the map in pixels"),
     ("Time", DOWN, "n", "Seconds of work, without waiting"),
-    ("Warnings", DOWN, "notes", "How many; and why there is no conversion"),
+    ("Warnings", DOWN, "notes", "Why there is no conversion, and how many warnings"),
 )
 """Of the table, behind the picture: name, which way the first click sorts, CSS class, explanation.
 What is sorted is a number in each cell: what an artist looks for, the worst, comes first."""
@@ -66,6 +66,10 @@ def page(rows: Sequence[Row], title: str, csv: str) -> Iterator[str]:
     words = "No map matches." if rows else "There are no maps in this library."
     yield f'</tbody></table></div>\n<p class="nothing" id="nothing"{empty}>{words}</p>\n'
     yield f"<script>{SCRIPT}</script>\n</body></html>\n"
+
+
+FAILURE = 1000
+"""Warnings that a failure counts as: all failures come before what is only warned of."""
 
 
 def readable(name: str) -> str:
@@ -244,4 +248,4 @@ def _notes(row: Row) -> str:
     sentences = [("sentence", row.sentence)] if row.sentence else []
     sentences += [("warning", warning) for warning in row.warnings]
     words = "".join(f'<p class="{look}">{escape(readable(s))}</p>' for look, s in sentences)
-    return _cell("notes", words, len(sentences))
+    return _cell("notes", words, len(sentences) + FAILURE * bool(row.sentence))

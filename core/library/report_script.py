@@ -25,6 +25,11 @@ function sort(head, direction) {
   for (const other of heads) other.removeAttribute("aria-sort");
   head.setAttribute("aria-sort", direction);
   body.append(...rows.map(row => row.element));
+  toFirst();
+}
+
+// What is new is seen from its beginning.
+function toFirst() {
   const gap = body.getBoundingClientRect().top - table.tHead.getBoundingClientRect().bottom;
   if (gap < 0) window.scrollBy(0, gap);
 }
@@ -52,6 +57,7 @@ function filter() {
   shown.textContent = count === rows.length ? "" :
     `${count.toLocaleString("en")} of ${rows.length.toLocaleString("en")} shown`;
   nothing.hidden = count > 0 || rows.length === 0;
+  toFirst();
 }
 
 search.addEventListener("input", filter);

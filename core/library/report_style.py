@@ -88,7 +88,7 @@ tbody tr.failed { background: var(--bad-paper); }
 }
 .map, .notes { overflow-wrap: anywhere; white-space: pre-wrap; }
 .map b { font-weight: 600; }
-.map small, .files { display: block; font-size: 0.8125rem; color: var(--soft); }
+.map small, .files { display: block; font-size: 0.93em; color: var(--soft); }
 .files a { display: inline-block; margin-right: 0.75em; }
 .notes p { margin: 0 0 0.25rem; color: var(--care); }
 .notes p.sentence { color: var(--bad); }
@@ -103,7 +103,7 @@ tbody tr.failed { background: var(--bad-paper); }
   tr {
     column-gap: 0.75rem; padding-inline: 1rem;
     grid-template-columns:
-      144px minmax(8rem, 1fr) 4.75rem 3.5rem 4rem 5.5rem 4rem 4.75rem 3.75rem 3.25rem;
+      144px minmax(8rem, 1fr) 4.75rem 3.5rem 4rem 5.5rem 4rem 4.75rem 6.5rem 3.25rem;
   }
   .notes { grid-column: 2 / -1; padding-top: 0.25rem; }
   thead .notes button { width: auto; }
@@ -111,7 +111,7 @@ tbody tr.failed { background: var(--bad-paper); }
   header, .bar { padding-inline: 1rem; }
   th:not([aria-sort]) button::after { content: none; }
 }
-@media (max-width: 940px) {
+@media (max-width: 990px) {
   tr {
     column-gap: 0.625rem;
     grid-template-columns: 112px minmax(8rem, 1fr) 3.25rem 4rem 5rem 3.75rem 4rem 3.75rem 3rem;
@@ -130,11 +130,13 @@ tbody tr.failed { background: var(--bad-paper); }
     --paper: #fff; --ink: #000; --soft: #444; --line: #bbb; --head: #fff; --accent: #000;
     --bad: #900; --bad-paper: #fff; --care: #000;
   }
+  html { font-size: 12px; }
+  .report { overflow: visible; }
+  table { min-width: 0; }
   .bar { display: none; }
   thead { position: static; }
   thead button::after { content: none; }
   tbody tr { content-visibility: visible; break-inside: avoid; }
-  body { font-size: 8pt; }
   header, tr { padding-inline: 0; }
 }
 """
