@@ -38,12 +38,15 @@ COLUMNS = (
 What is sorted is a number in each cell: what an artist looks for, the worst, comes first."""
 
 KINDS = {
-    "lights.json": "lights",
-    "residual.exr": "residual map",
-    "samples.json": "samples",
-    "preview.png": "preview",
+    "lights": "lights",
+    "residual": "residual map",
+    "samples": "samples",
+    "preview": "preview",
 }
-"""What a link to a file of this ending is called."""
+"""What a link to a file of this kind is called."""
+
+FAILURE = 1000
+"""Warnings that a failure counts as: all failures come before what is only warned of."""
 
 
 def page(rows: Sequence[Row], title: str, csv: str) -> Iterator[str]:
@@ -66,10 +69,6 @@ def page(rows: Sequence[Row], title: str, csv: str) -> Iterator[str]:
     words = "No map matches." if rows else "There are no maps in this library."
     yield f'</tbody></table></div>\n<p class="nothing" id="nothing"{empty}>{words}</p>\n'
     yield f"<script>{SCRIPT}</script>\n</body></html>\n"
-
-
-FAILURE = 1000
-"""Warnings that a failure counts as: all failures come before what is only warned of."""
 
 
 def readable(name: str) -> str:
@@ -184,7 +183,7 @@ def _picture(row: Row) -> str:
         f'<img src="data:image/jpeg;base64,{escape(row.thumbnail)}" width="192" height="96" '
         f'decoding="async" alt="{name} with its suns marked">'
     )
-    preview = next((f for f in row.files if f.endswith("." + ENDINGS["preview"])), None)
+    preview = next((file for file in row.files if _kind(file) == KINDS["preview"]), None)
     if preview:
         image = f'<a href="{link(preview)}">{image}</a>'
     return _cell("picture", image)
@@ -208,7 +207,7 @@ def _map(row: Row, place: int) -> str:
 
 def _kind(file: str) -> str:
     """What a written file is to a reader."""
-    known = (name for ending, name in KINDS.items() if file.endswith("." + ending))
+    known = (word for kind, word in KINDS.items() if file.endswith(f".{ENDINGS[kind]}"))
     return next(known, None) or escape(readable(PurePosixPath(file).name))
 
 
