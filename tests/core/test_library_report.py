@@ -48,7 +48,6 @@ def show(opened, tmp_path):
         report, _ = write_report(tmp_path, rows, title)
         contexts.append(opened.new_context(**options))
         page = contexts[-1].new_page()
-        page.set_default_timeout(10_000)
         page.on("console", lambda message: said.append(message.text))
         page.on("pageerror", lambda error: said.append(str(error)))
         page.on("dialog", lambda dialog: said.append(dialog.message))
