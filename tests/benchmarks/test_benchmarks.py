@@ -17,6 +17,7 @@ from tests.benchmarks import (
     eevee,
     eevee_report,
     equal_error,
+    library_report,
     light_tree,
     lights,
     looking,
@@ -28,6 +29,7 @@ from tests.benchmarks import (
     two_passes,
     voronoi,
 )
+from tests.browser import chromium
 
 
 def test_region_a(tmp_path, monkeypatch, sunrise):
@@ -223,3 +225,13 @@ def test_shares(tmp_path, monkeypatch, sunrise):
     error = {(one.target, one.share): one.error for one in results}
     assert error["export", None] < error["export", 0.0]
     assert error["cycles", None] < error["cycles", 0.0]
+
+
+@pytest.mark.skipif(chromium() is None, reason="there is no Chromium: install Debian's chromium")
+def test_library_report(tmp_path, sunrise):
+    results = library_report.main([str(sunrise), "--opens", "3", "-o", str(tmp_path)])
+    assert all(min(one.times) > 0 and min(one.busy) > 0 for one in results)
+    # The page's own work, the best of three: what else the machine does must not count.
+    assert min(results[0].busy) < results[0].bar
+    lines = (tmp_path / "library_report.md").read_text().splitlines()
+    assert sum(line.startswith("| ") for line in lines) == 2 + len(results)
