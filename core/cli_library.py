@@ -255,7 +255,7 @@ def _say_end(result: LibraryResult, seconds: float, as_json: bool) -> None:
             "failed": len(result.failed),
             "unread": list(result.unread),
             "seconds": seconds,
-            "report": str(result.report) if result.report else None,
+            "report": str(result.report),
         }
         print(json.dumps(counts))
         return
@@ -265,8 +265,7 @@ def _say_end(result: LibraryResult, seconds: float, as_json: bool) -> None:
     parts += [f"{result.known:,} had been converted before"] if result.known else []
     parts += [f"{len(result.failed):,} failed"] if result.failed else []
     print(f"{len(result.rows):,} maps: {', '.join(parts)}, in {seconds:,.1f} s")
-    if result.report:
-        print(f"wrote {result.report}")
+    print(f"wrote {result.report}")
 
 
 def _count(text: str) -> int:

@@ -20,6 +20,7 @@ from .options import LibraryOptions
 from .plan import PlannedMap, plan
 from .processes import converter
 from .records import Row
+from .report import write_report
 from .scan import scan
 from .state import STATE, is_current_by_times, read_record
 from .work import MapJob, MapResult
@@ -57,7 +58,7 @@ class LibraryResult:
     rows: tuple[Row, ...]
     known: int
     unread: tuple[str, ...]
-    report: Path | None
+    report: Path
 
     @property
     def failed(self) -> tuple[Row, ...]:
@@ -132,7 +133,8 @@ def convert_library(
             known += result.known
             told.settled(number, result.row, result.known)
         finished = tuple(row for row in rows if row)
-        return LibraryResult(finished, known, planned.unread, None)
+        report, _ = write_report(output, finished, Path(library).resolve().name)
+        return LibraryResult(finished, known, planned.unread, report)
 
 
 def plan_library(

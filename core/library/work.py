@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import json
 import time
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -185,14 +185,10 @@ def _known_files(written: WrittenFiles, output: Path) -> dict[str, Known]:
 
 
 def _row(conversion: Conversion, row: Row) -> Row:
+    from ..suspicions import map_warnings
+    from .thumbnail import thumbnail
+
     environment = conversion.environment
-    repaired = environment.repairs.pixels
-    warnings: Sequence[str] = (
-        *environment.warnings,
-        *([f"Repaired pixels: {environment.repairs}."] if repaired else []),
-        *_left_out(conversion),
-        *conversion.notes,
-    )
     return replace(
         row,
         status="done",
@@ -203,7 +199,8 @@ def _row(conversion: Conversion, row: Row) -> Row:
         predicted_error=conversion.predicted_error,
         ground_error=conversion.ground_error,
         account_error=float(conversion.account.relative_error.max()),
-        warnings=tuple(warnings),
+        warnings=(*map_warnings(conversion), *_left_out(conversion)),
+        thumbnail=base64.b64encode(thumbnail(conversion)).decode(),
     )
 
 
