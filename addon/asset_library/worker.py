@@ -12,7 +12,10 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 NAME = "sunsplit"
@@ -28,9 +31,22 @@ def main() -> None:
             raise ImportError(f"{root} holds no package")
         sys.modules[NAME] = module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
+    with _stdout_to_stderr():
+        writing = importlib.import_module(f"{NAME}.addon.asset_library.writing")
     serving = importlib.import_module(f"{NAME}.core.library.serving")
-    writing = importlib.import_module(f"{NAME}.addon.asset_library.writing")
     serving.serve(writing.answer)
+
+
+@contextmanager
+def _stdout_to_stderr() -> Iterator[None]:
+    """Blender has things to say as soon as it is imported: not among the answers."""
+    answers = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        yield
+    finally:
+        os.dup2(answers, 1)
+        os.close(answers)
 
 
 if __name__ == "__main__":
