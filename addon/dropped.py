@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import bpy
 
 from . import eevee
+from .packed_skies import as_local, is_packed
 from .restoring import restore_scene, swap_overrides
 from .skies import REPORT, suns_of
 from .trace import TAG
@@ -22,7 +23,7 @@ def complete_imported(
         used = [sky for sky in skies if sky == scene.world or _is_in(scene, suns_of(sky))]
     except ReferenceError:  # undone or deleted in between
         return
-    if not used or scene.library is not None:
+    if not used or scene.library is not None or is_complete(scene, used[0]):
         return
     complete_sky(scene, used[0], before)
     window = bpy.context.window_manager.windows[:1]
@@ -37,15 +38,19 @@ def complete_sky(
     """Give a scene a sky's world and suns, as if they had been made there.
 
     before: what Restore shall bring back; when that is a converted world, what it was made of.
-    Where there is none, Restore brings back the HDRI. A linked sky stays linked.
+    Where there is none, Restore brings back the HDRI. A linked sky stays linked, but for one that
+    is packed.
     """
-    state, suns = scene.sunsplit, suns_of(sky)
-    if state.converted_world == sky and scene.world == sky:
-        return
+    state = scene.sunsplit
+    if before == sky:
+        before = None
+    if is_packed(sky):
+        sky = as_local(sky)
+    suns = suns_of(sky)
     if before is not None and before == state.converted_world:
         before = state.original_world
     restore_scene(scene)
-    if before is None or before == sky:
+    if before is None:
         before = unconverted(sky.copy())
         before.name = f"{sky.name} (HDRI)"
     swap_overrides(scene, scene.world, sky)
@@ -57,6 +62,10 @@ def complete_sky(
             asset.asset_clear()  # it is one of the library, not of this file
     if sky.library is None and "EEVEE" in scene.render.engine:
         eevee.apply(scene, [entry.lamp for entry in state.lamps])
+
+
+def is_complete(scene: bpy.types.Scene, sky: bpy.types.World) -> bool:
+    return scene.world == sky and scene.sunsplit.converted_world == sky
 
 
 def _is_in(scene: bpy.types.Scene, suns: bpy.types.Collection) -> bool:

@@ -337,6 +337,39 @@ def test_a_linked_sky_stays_linked_and_can_be_taken_away(file):
     assert not scene.sunsplit.is_converted
 
 
+@pytest.mark.skipif(bpy.app.version < (5, 0), reason="such links came with Blender 5.0")
+def test_a_sky_that_blender_packs_becomes_the_scenes_own(library, file):
+    """As Blender 5 does it by itself when an asset is dragged."""
+    scene = fresh_scene()
+    scene.world = own = bpy.data.worlds.new("Own")
+    with bpy.data.libraries.load(str(file), link=True, pack=True) as (_, here):
+        here.worlds = [NAME]
+    before = inventory()
+    used(scene, here.worlds[0])
+    sky = scene.world
+    assert sky.is_editable
+    assert sky.asset_data is None
+    lamps = lamps_of(suns_of(sky))
+    assert [entry.lamp for entry in scene.sunsplit.lamps] == lamps
+    assert all(thing.is_editable and thing.data.is_editable for thing in lamps)
+    assert set.union(*(targets(lamp.data) for lamp in lamps)) == {
+        sky,
+        scene.sunsplit.sky,
+        *(lamp.data for lamp in lamps),
+    }
+    for image in plain_images(sky):
+        assert Path(bpy.path.abspath(image.filepath)).parent == library
+        assert tuple(image.size) == (1024, 512)
+    assert not bpy.data.libraries
+    after = inventory()
+    assert {kind: len(names) for kind, names in after.items()} == {
+        kind: len(names) for kind, names in before.items()
+    }
+    bpy.ops.sunsplit.restore()
+    assert scene.world == own
+    assert not bpy.data.lights
+
+
 def test_another_sky_takes_the_place_of_the_first(file):
     """Both assets dragged one after the other are two skies: the second one stays."""
     scene = fresh_scene()
