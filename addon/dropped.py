@@ -23,7 +23,7 @@ def complete_imported(
         used = [sky for sky in skies if sky == scene.world or _is_in(scene, suns_of(sky))]
     except ReferenceError:  # undone or deleted in between
         return
-    if not used or scene.library is not None or is_complete(scene, used[0]):
+    if not used or scene.library is not None or _is_complete(scene, used[0]):
         return
     complete_sky(scene, used[0], before)
     window = bpy.context.window_manager.windows[:1]
@@ -42,6 +42,10 @@ def complete_sky(
     is packed.
     """
     state = scene.sunsplit
+    scene.world = sky
+    if state.converted_world == sky:  # its suns were taken out, or are here a second time
+        _put_into(scene, suns_of(sky))
+        return
     if before == sky:
         before = None
     if is_packed(sky):
@@ -53,8 +57,7 @@ def complete_sky(
     if before is None:
         before = unconverted(sky.copy())
         before.name = f"{sky.name} (HDRI)"
-    swap_overrides(scene, scene.world, sky)
-    scene.world = sky
+    swap_overrides(scene, before, sky)
     _put_into(scene, suns)
     _register(scene, sky, suns, before)
     for asset in (sky, suns):
@@ -64,8 +67,10 @@ def complete_sky(
         eevee.apply(scene, [entry.lamp for entry in state.lamps])
 
 
-def is_complete(scene: bpy.types.Scene, sky: bpy.types.World) -> bool:
-    return scene.world == sky and scene.sunsplit.converted_world == sky
+def _is_complete(scene: bpy.types.Scene, sky: bpy.types.World) -> bool:
+    suns = suns_of(sky)
+    stand = suns in list(scene.collection.children) and not _instances(scene, suns)
+    return stand and scene.world == sky == scene.sunsplit.converted_world
 
 
 def _is_in(scene: bpy.types.Scene, suns: bpy.types.Collection) -> bool:

@@ -14,13 +14,16 @@ def is_packed(sky: bpy.types.World) -> bool:
 
 
 def as_local(sky: bpy.types.World) -> bpy.types.World:
-    """A local copy of a packed sky, in its place wherever it was used; the packed one goes."""
+    """A local copy of a packed sky, in its place wherever it was used; the packed one goes.
+
+    sky: one that a scene uses already: Blender makes nothing local that only linked data use.
+    """
     library = sky.library
-    packed = _parts(sky)
-    copies = [part.make_local() for part in packed]
-    for part, copy in zip(packed, copies, strict=True):
+    parts = _parts(sky)
+    copies = [part.make_local() for part in parts]
+    for part, copy in zip(parts, copies, strict=True):
         part.user_remap(copy)
-    bpy.data.batch_remove(packed)
+    bpy.data.batch_remove(parts)
     for empty in (library, library.archive_parent_library):
         if empty is not None and not empty.users_id:
             bpy.data.libraries.remove(empty)

@@ -14,6 +14,7 @@ import importlib
 import importlib.util
 import os
 import sys
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -32,9 +33,21 @@ def main() -> None:
         sys.modules[NAME] = module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
     with _stdout_to_stderr():
+        _find_libraries()
         writing = importlib.import_module(f"{NAME}.addon.asset_library.writing")
     serving = importlib.import_module(f"{NAME}.core.library.serving")
     serving.serve(writing.answer)
+
+
+def _find_libraries() -> None:
+    """Without a user's preferences Blender does not look where extensions have their libraries."""
+    import bpy
+
+    version = "python{}.{}".format(*sys.version_info)
+    place = Path(".local", "lib", version, "site-packages")
+    found = bpy.utils.user_resource("EXTENSIONS", path=str(place))
+    if found and found not in sys.path:
+        sys.path.append(found)
 
 
 @contextmanager
@@ -50,4 +63,8 @@ def _stdout_to_stderr() -> Iterator[None]:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except Exception:  # Blender would go on, and end as if all were well
+        traceback.print_exc()
+        sys.exit(1)

@@ -41,7 +41,8 @@ def write_assets(jobs: Sequence[AssetJob], blend: Path, leaves_out: bool = False
     leaves_out: maps that cannot be shown, as long as there are others. Whatever is open in this
     Blender is lost. Raises SunsplitError.
     """
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    # The preferences stay: with new ones Blender would forget where libraries are.
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     assets: set[bpy.types.ID] = set()
     left_out = []
     for job in jobs:

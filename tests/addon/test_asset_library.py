@@ -338,14 +338,22 @@ def test_a_linked_sky_stays_linked_and_can_be_taken_away(file):
 
 
 @pytest.mark.skipif(bpy.app.version < (5, 0), reason="such links came with Blender 5.0")
-def test_a_sky_that_blender_packs_becomes_the_scenes_own(library, file):
+@pytest.mark.parametrize("dragged", ["world", "suns"])
+def test_a_sky_that_blender_packs_becomes_the_scenes_own(library, file, dragged):
     """As Blender 5 does it by itself when an asset is dragged."""
     scene = fresh_scene()
     scene.world = own = bpy.data.worlds.new("Own")
     with bpy.data.libraries.load(str(file), link=True, pack=True) as (_, here):
         here.worlds = [NAME]
     before = inventory()
-    used(scene, here.worlds[0])
+    if dragged == "world":
+        used(scene, here.worlds[0])
+    else:
+        instance = bpy.data.objects.new("Instance", None)
+        instance.instance_type = "COLLECTION"
+        instance.instance_collection = suns_of(here.worlds[0])
+        scene.collection.objects.link(instance)
+        complete_imported(scene, [here.worlds[0]], own)
     sky = scene.world
     assert sky.is_editable
     assert sky.asset_data is None
@@ -368,6 +376,21 @@ def test_a_sky_that_blender_packs_becomes_the_scenes_own(library, file):
     bpy.ops.sunsplit.restore()
     assert scene.world == own
     assert not bpy.data.lights
+
+
+def test_linked_suns_that_come_a_second_time_stand_there_once(file):
+    scene = fresh_scene()
+    scene.world = own = bpy.data.worlds.new("Own")
+    brought("World", file, NAME, link=True)
+    sky = bpy.data.worlds[NAME]
+    used(scene, sky)
+    standing = sorted(thing.name for thing in scene.objects)
+    scene.collection.children.unlink(suns_of(sky))  # as Blender does it when they are dragged
+    brought("Collection", file, f"{NAME} Suns", link=True)
+    complete_imported(scene, [sky], sky)
+    assert sorted(thing.name for thing in scene.objects) == standing
+    assert scene.sunsplit.original_world == own
+    assert len(scene.sunsplit.lamps) == 4
 
 
 def test_another_sky_takes_the_place_of_the_first(file):
