@@ -5,7 +5,7 @@ import sys
 
 import bpy
 
-from . import command, operators, overlay, panel, presets, properties
+from . import command, operators, overlay, panel, presets, properties, skies
 
 CLASSES = (
     properties.SunsplitLamp,
@@ -14,6 +14,7 @@ CLASSES = (
     properties.SunsplitSettings,
     operators.SUNSPLIT_OT_convert,
     operators.SUNSPLIT_OT_restore,
+    operators.SUNSPLIT_OT_complete_sky,
     operators.SUNSPLIT_OT_reset_factors,
     operators.SUNSPLIT_OT_select_suns,
     presets.SUNSPLIT_OT_add_preset,
@@ -37,6 +38,7 @@ def register() -> None:
     command.register()
     presets.register()
     overlay.register()
+    skies.register()
     # Blender unregisters its add-ons when it ends. As a Python module it does not, and 4.5 then
     # hangs or crashes over any operator or panel that is left.
     if not bpy.app.binary_path:
@@ -47,6 +49,7 @@ def unregister() -> None:
     atexit.unregister(unregister)
     if not hasattr(bpy.types.Scene, "sunsplit"):
         return  # Blender disables an extension when it ends, after what `register` has asked for.
+    skies.unregister()
     overlay.unregister()
     presets.unregister()
     command.unregister()

@@ -53,13 +53,12 @@ def make_lamps(
     return lamps
 
 
-def link_lamps(
-    scene: bpy.types.Scene, rig: Rig, lamps: Sequence[bpy.types.Object]
+def collection_of(
+    rig: Rig, lamps: Sequence[bpy.types.Object], name: str = COLLECTION
 ) -> bpy.types.Collection:
-    """Put lamps and what holds them into a new collection of a scene."""
-    collection = bpy.data.collections.new(COLLECTION)
+    """A new collection with lamps and what holds them; in no scene yet."""
+    collection = bpy.data.collections.new(name)
     collection[TAG] = True
-    scene.collection.children.link(collection)
     for thing in (*rig_of(rig.sky), *lamps):
         collection.objects.link(thing)
     return collection

@@ -9,6 +9,7 @@ from bpy.props import EnumProperty, FloatProperty
 
 from .modal import InSteps
 from .properties import CHOICES
+from .skies import lacks_suns
 from .steps import Steps
 
 if TYPE_CHECKING:
@@ -81,6 +82,28 @@ class SUNSPLIT_OT_restore(bpy.types.Operator):
         from .restoring import restore_scene
 
         restore_scene(context.scene)
+        return {"FINISHED"}
+
+
+class SUNSPLIT_OT_complete_sky(bpy.types.Operator):
+    """Add the suns that belong to this world, which comes from an asset library"""
+
+    bl_idname = "sunsplit.complete_sky"
+    bl_label = "Add Its Suns"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not lacks_suns(context.scene):
+            cls.poll_message_set("No suns belong to this world, or they are there already")
+            return False
+        return _is_editable(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        from .dropped import complete_sky
+
+        scene = context.scene
+        complete_sky(scene, scene.world, scene.sunsplit.original_world)
         return {"FINISHED"}
 
 

@@ -14,6 +14,7 @@ from bl_ui.utils import PresetPanel
 from .controls import FACTORS, changed_factors, rotation_control
 from .jobs import Job
 from .overlay import draw_switch
+from .skies import lacks_suns
 
 CHARACTER = 6.5
 """Width of a character of Blender's interface font in pixels at scale 1, on average and a bit."""
@@ -44,6 +45,9 @@ class _Main:
             return
         column = self.layout.column()
         column.scale_y = 1.6
+        if lacks_suns(context.scene):
+            column.operator("sunsplit.complete_sky", icon="LIGHT_SUN")
+            return
         text = "Convert Again" if settings.is_converted else "Convert World"
         column.operator("sunsplit.convert", text=text, icon="LIGHT_SUN")
         if settings.is_converted:

@@ -16,22 +16,26 @@ LEAST_SAID = 0.0005
 """Of all light: less of it that reaches nothing is not worth a sentence."""
 
 
-def headline(conversion: Conversion) -> str:
-    count, share = len(conversion.suns), conversion.account.share
+def headline(count: int, share: float) -> str:
+    """count: of lamps. share: of all light that they give."""
     if count == 1:
         return said("1 lamp with {share:.1%} of all light").format(share=share)
     return said("{count} lamps with {share:.1%} of all light").format(count=count, share=share)
+
+
+def predicted(edges: float, ground: float) -> str:
+    """What is to be wrong by prediction, as parts of the light."""
+    text = said(
+        "By prediction right within {edges:.2%} under shadows, {ground:.2%} on level ground"
+    )
+    return text.format(edges=edges, ground=ground)
 
 
 def made_sentences(conversion: Conversion) -> list[str]:
     """How true it is, and what the user should know of it."""
     lines = []
     if conversion.suns:
-        text = said(
-            "By prediction right within {edges:.2%} under shadows, {ground:.2%} on level ground"
-        )
-        edges, ground = conversion.predicted_error, conversion.ground_error
-        lines.append(text.format(edges=edges, ground=ground))
+        lines.append(predicted(conversion.predicted_error, conversion.ground_error))
     if conversion.residual is not None:
         error = conversion.account.relative_error.max()
         lines.append(said("Account: lamps + world = map within {error:.0e}").format(error=error))

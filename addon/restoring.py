@@ -8,6 +8,7 @@ from . import eevee, passes
 from .lamps import remove_lamps, unlink_lamps
 from .light_groups import remove_groups
 from .rig import remove_rig, rig_of
+from .skies import SUNS
 from .world import remove_converted, unconverted
 
 
@@ -20,7 +21,8 @@ def restore_scene(scene: bpy.types.Scene) -> None:
     converted, collection = state.converted_world, state.collection
     original = state.original_world
     lamps = [entry.lamp for entry in state.lamps if entry.lamp]
-    if original is None and converted is not None:
+    linked = converted is not None and converted.library is not None
+    if original is None and converted is not None and not linked:
         original = unconverted(converted)
     if converted is not None:
         if scene.world == converted:
@@ -30,18 +32,34 @@ def restore_scene(scene: bpy.types.Scene) -> None:
     eevee.take_back(scene)
     remove_groups(scene.view_layers)
     sky = state.sky
-    state.original_world = state.converted_world = state.collection = state.sky = None
-    state.lamps.clear()
-    state.report = state.outlines = ""
+    _forget(state)
     if state.light_tree_off and hasattr(scene, "cycles"):
         scene.cycles.use_light_tree = True
     state.light_tree_off = False
+    if linked:
+        _unlink_sky(scene, collection)
+        return
+    if converted is not None and not converted.users and SUNS in converted:
+        del converted[SUNS]  # else it would keep them
     made = [*lamps, *rig_of(sky)]
     unlink_lamps(scene, collection, made)
     remove_rig(sky, lamps)
     remove_lamps(lamps)
     if converted is not None and converted != original:
         remove_converted(converted)
+
+
+def _forget(state: bpy.types.PropertyGroup) -> None:
+    """What a scene knows of its conversion."""
+    state.original_world = state.converted_world = state.collection = state.sky = None
+    state.lamps.clear()
+    state.report = state.outlines = ""
+
+
+def _unlink_sky(scene: bpy.types.Scene, collection: bpy.types.Collection | None) -> None:
+    """Of a sky that is linked from an asset library, nothing is removed but from the scene."""
+    if collection is not None and collection in list(scene.collection.children):
+        scene.collection.children.unlink(collection)
 
 
 def swap_overrides(

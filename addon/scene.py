@@ -14,7 +14,7 @@ from ..core.errors import UnusableInput
 from ..core.outlines import outlines_of
 from ..core.passes import parts_of, samples_of_passes
 from ..core.progress import Progress, silent
-from ..core.sampling import needs_light_tree
+from ..core.sampling import choose_sampling, needs_light_tree
 from ..core.settings import ConversionSettings
 from ..core.visible import VisiblePart, visible_part
 from . import eevee, passes
@@ -30,7 +30,7 @@ from .images import (
     write_map,
 )
 from .known import known_conversion
-from .lamps import link_lamps, make_lamps, name_lamps
+from .lamps import collection_of, make_lamps, name_lamps
 from .light_groups import put_into_groups
 from .options import SceneOptions
 from .rays import Reach
@@ -62,7 +62,7 @@ class SceneConversion:
 
     @property
     def headline(self) -> str:
-        return headline(self.conversion)
+        return headline(len(self.conversion.suns), self.conversion.account.share)
 
 
 def convert_scene(
@@ -173,8 +173,13 @@ def _replace(
     needs = found if options.skips else ALL
     original = state.original_world if _is_converted(scene) else world
     tree_off = _is_without_light_tree(scene, conversion, needs)
+    has_cells = conversion.settings.residual == "voronoi"
+    sampling = choose_sampling(
+        conversion.residual, conversion.visible_share, has_cells, conversion.visible
+    )
+    sees_it = needs.camera_sees_world
     try:
-        new = converted_world(world, light, conversion, images, needs.camera_sees_world)
+        new = converted_world(world, light, images, sampling, has_cells, sees_it)
     finally:
         remove_images(images)
     light = find_light(new, scene.render.engine)  # the same, in the new world
@@ -262,7 +267,8 @@ def _install(
     for lamp in lamps:
         state.lamps.add().lamp = lamp
     name_lamps(conversion.suns, lamps, rig, conversion.account.source @ LUMINANCE_WEIGHTS)
-    state.sky, state.collection = rig.sky, link_lamps(scene, rig, lamps)
+    state.sky, state.collection = rig.sky, collection_of(rig, lamps)
+    scene.collection.children.link(state.collection)
     return SceneConversion(conversion, world, state.collection)
 
 

@@ -9,11 +9,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.conversion import Conversion
 from ..core.errors import UnusableInput
-from ..core.sampling import WorldSampling, choose_sampling
+from ..core.sampling import WorldSampling
 from .light_groups import take_out_of_groups
 from .mapping import map_from_world, turns
+from .skies import REPORT, SUNS
 from .trace import TAG, Input, Place, lighting_textures
 
 TURNS = "sunsplit_turns"
@@ -67,8 +67,9 @@ def find_light(world: bpy.types.World, engine: str = "CYCLES") -> WorldLight:
 def converted_world(
     world: bpy.types.World,
     light: WorldLight,
-    conversion: Conversion,
     images: Mapping[str, bpy.types.Image],
+    sampling: WorldSampling,
+    has_cells: bool = False,
     camera_sees_it: bool = True,
 ) -> bpy.types.World:
     """A copy of a world in which all rays but the camera's see the residual (or black), or all
@@ -76,12 +77,14 @@ def converted_world(
 
     world: what `light` was found in; when it is a converted one, the copy loses what that
     conversion has put in. images: "residual"; "camera", a narrower map that the camera sees.
-    Nothing is left behind when this fails.
+    sampling: Cycles' for the residual. has_cells: the residual is a Voronoi map. Nothing is left
+    behind when this fails.
     """
     new = world.copy()
     if new.override_library:  # of which no new node would be saved
         new = new.make_local(clear_liboverride=True)
     new[TAG] = True
+    _forget_sky(new)
     take_out_of_groups(new)
     try:
         tree = new.node_tree
@@ -95,14 +98,13 @@ def converted_world(
         if not any(turn.rotation for turn in turns(light.texture)):
             _insert_rotation(tree, texture)
         # Between cells nothing is to be blended: a Voronoi map has edges.
-        closest = conversion.settings.residual == "voronoi"
-        interpolation = "Closest" if closest else texture.interpolation
+        interpolation = "Closest" if has_cells else texture.interpolation
         mix = _insert(tree, texture, images.get("residual"), interpolation, -300)
         if camera_sees_it:
             _show_camera(mix)
         if "camera" in images:
             _insert(tree, texture, images["camera"], texture.interpolation, 300)
-        _set_sampling(new, _sampling(conversion, closest))
+        _set_sampling(new, sampling)
     except BaseException:  # whatever it is, it goes on; only the half-made copy goes away
         remove_converted(new)
         raise
@@ -223,10 +225,6 @@ def _texture_like(
     return rest
 
 
-def _sampling(conversion: Conversion, cells: bool) -> WorldSampling:
-    return choose_sampling(conversion.residual, conversion.visible_share, cells, conversion.visible)
-
-
 def _set_sampling(world: bpy.types.World, sampling: WorldSampling) -> None:
     """Cycles' world importance sampling; nothing to do where Cycles is switched off."""
     if not hasattr(world, "cycles"):
@@ -311,4 +309,12 @@ def unconverted(world: bpy.types.World) -> bpy.types.World:
         trees += [n.node_tree for n in tree.nodes if n.type == "GROUP" and n.node_tree]
     take_out_of_groups(world)
     del world[TAG]
+    _forget_sky(world)
     return world
+
+
+def _forget_sky(world: bpy.types.World) -> None:
+    """What a world has from an asset library, its suns above all, is not its copy's."""
+    for mark in (SUNS, REPORT):
+        if mark in world:
+            del world[mark]

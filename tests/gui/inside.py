@@ -305,6 +305,64 @@ def timed(work: Callable, name: str) -> Callable:
     return draw
 
 
+# The Asset Browser
+
+
+def add_library(folder: str) -> None:
+    """What a user adds in the preferences, under File Paths."""
+    libraries = bpy.context.preferences.filepaths.asset_libraries
+    if "Skies" not in libraries:
+        libraries.new(name="Skies", directory=str(FOLDER / folder))
+
+
+def open_assets() -> None:
+    """An Asset Browser in the place of the properties."""
+    area = next(area for area in window().screen.areas if area.type == "PROPERTIES")
+    area.ui_type = "ASSETS"
+
+
+def show_assets(method: str) -> None:
+    """What an Asset Browser shows, once it is open; how it imports what is dragged from it."""
+    space = assets().spaces.active
+    space.params.asset_library_reference = "Skies"
+    space.params.import_method = method
+    space.params.display_size = 96
+    space.show_region_toolbar = False
+
+
+def assets() -> bpy.types.Area:
+    return next(area for area in window().screen.areas if area.ui_type == "ASSETS")
+
+
+def place_of_assets() -> list[int]:
+    """As `place`, of what the Asset Browser shows assets in."""
+    inner = next(one for one in assets().regions if one.type == "WINDOW")
+    return [inner.x, window().height - inner.y - inner.height, inner.width, inner.height]
+
+
+def asset_at_mouse() -> str:
+    """The name of the asset that is active; empty where none is."""
+    area = assets()
+    inner = next(one for one in area.regions if one.type == "WINDOW")
+    with bpy.context.temp_override(window=window(), area=area, region=inner):
+        return bpy.context.asset.name if bpy.context.asset else ""
+
+
+def sky_state() -> dict[str, object]:
+    """What a scene has of a sky of an asset library."""
+    scene, settings = bpy.context.scene, bpy.context.scene.sunsplit
+    lamps = [thing for thing in scene.objects if thing.type == "LIGHT"]
+    return {
+        "world": scene.world.name,
+        "original": settings.original_world.name if settings.original_world else None,
+        "lamps": [lamp.name for lamp in lamps],
+        "known": [entry.lamp.name for entry in settings.lamps],
+        "instances": [t.name for t in scene.objects if t.instance_collection],
+        "editable": scene.world.is_editable and all(lamp.is_editable for lamp in lamps),
+        "to_light": list(lamps[0].matrix_world.col[2].xyz) if lamps else [],
+    }
+
+
 # The overlay
 
 

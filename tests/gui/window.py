@@ -151,6 +151,22 @@ class Window:
             self.settle()
         self._do("mouseup", button)
 
+    def carry(self, start: tuple[int, int], end: tuple[int, int]) -> None:
+        """Drag a thing with the mouse from one place to another, and drop it there."""
+        self.move(*start)
+        self.settle()
+        self._do("mousedown", 1)
+        self.settle()
+        for _ in range(DRAGS):  # away from where it was pressed, for Blender to take it for a drag
+            self._do("mousemove_relative", "--", -4, 2)
+            self.settle()
+        x, y = start[0] - 4 * DRAGS, start[1] + 2 * DRAGS
+        for n in range(1, DRAGS + 1):
+            self.move(x + (end[0] - x) * n // DRAGS, y + (end[1] - y) * n // DRAGS)
+            self.settle()
+        self._do("mouseup", 1)
+        self.settle()
+
     def quit(self) -> None:
         """Close Blender as a user does; it must end well."""
         self.key("ctrl+q")

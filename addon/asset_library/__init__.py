@@ -1,0 +1,1 @@
+"""Converted maps as assets: a worker that makes .blend files of them, see `worker`."""
