@@ -19,4 +19,4 @@ def unregister() -> None:
 def _run(arguments: list[str]) -> int:
     from ..core.cli import main
 
-    return main(arguments)
+    return main(arguments, blender=bpy.app.binary_path or None)

@@ -34,12 +34,12 @@ WRONG_USAGE = 2
 CANCELLED = 130
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one verb and return the exit status."""
+def main(arguments: Sequence[str] | None = None, blender: str | None = None) -> int:
+    """Run one verb and return the exit status. blender: the program that this runs in, if any."""
     try:
         _print_any_name()
         with interrupts.remembered():
-            status = _run(arguments)
+            status = _run(arguments, blender)
         # Here, where a reader that has left can be told from an error; not when Python ends.
         if sys.stdout:
             sys.stdout.flush()
@@ -62,9 +62,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(f"cancelled, {str(stop) or 'nothing was written'}.", CANCELLED)
 
 
-def _run(arguments: Sequence[str] | None) -> int:
+def _run(arguments: Sequence[str] | None, blender: str | None) -> int:
     try:
         options = _parser().parse_args(arguments)
+        options.own_blender = blender
     except SystemExit as end:  # argparse ends the program, and Blender with it
         return int(end.code or 0)
     return options.run(options)

@@ -15,16 +15,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from . import interrupts
 from .cli_settings import add_settings, settings_from
-from .library.options import LARGEST, LibraryOptions
+from .library.options import LARGEST, Assets, LibraryOptions
 from .library.sizes import size_name, width_of
 
 if TYPE_CHECKING:  # imported where they are used: `--help` must not wait for them
-    from .library.records import Row
-    from .library.run import LibraryPlan, LibraryResult, Listener, Planned, Settled
+    from .library.run import Event, LibraryPlan, LibraryResult, Listener, Planned
 
 REPAINT = 0.5
 """Seconds between two paintings of the bar: time runs while a large map is converted."""
@@ -40,6 +39,7 @@ def add_library(verb: argparse.ArgumentParser) -> None:
     _add_work(verb.add_argument_group("the work"))
     add_settings(verb)
     verb.add_argument("--preview", action="store_true", help="also write <name>.preview.png")
+    _add_assets(verb.add_argument_group("an asset library for Blender"))
     verb.set_defaults(run=run_library)
 
 
@@ -98,7 +98,22 @@ def _add_work(group: argparse._ArgumentGroup) -> None:
     )
 
 
+def _add_assets(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--assets",
+        choices=get_args(Assets),
+        help="make assets of skies, with previews: a .blend file for each map, or one for all",
+    )
+    group.add_argument("--pack", action="store_true", help="put images into the .blend files")
+    group.add_argument(
+        "--blender",
+        metavar="PROGRAM",
+        help="the Blender that makes them (default: this one, or the one that is installed)",
+    )
+
+
 def run_library(options: argparse.Namespace) -> int:
+    from .library.assets import AssetSettled
     from .library.run import convert_library, plan_library
 
     chosen = LibraryOptions(
@@ -109,6 +124,8 @@ def run_library(options: argparse.Namespace) -> int:
         exclude=tuple(options.exclude),
         sizes=options.sizes,
         largest=options.largest,
+        assets=options.assets,
+        pack=options.pack,
     )
     if options.dry_run:
         _say_plan(plan_library(options.library, options.output, chosen), options.json)
@@ -116,9 +133,10 @@ def run_library(options: argparse.Namespace) -> int:
     begun, settled = time.monotonic(), 0
     with _telling(options.json) as tell:
 
-        def listen(event: Settled) -> None:
+        def listen(event: Event) -> None:
             nonlocal settled
-            settled = event.number
+            if not isinstance(event, AssetSettled):
+                settled = event.number
             interrupts.check()
             tell(event)
 
@@ -129,6 +147,7 @@ def run_library(options: argparse.Namespace) -> int:
                 chosen,
                 workers=options.workers,
                 memory=options.memory,
+                blender=options.blender or options.own_blender,
                 listen=listen,
             )
         except KeyboardInterrupt:
@@ -187,24 +206,43 @@ def _telling(as_json: bool) -> Iterator[Listener]:
         yield _tell_by_line
 
 
-def _settled_as_dict(event: Settled) -> dict[str, Any]:
+def _settled_as_dict(event: Event) -> dict[str, Any]:
+    from .library.assets import AssetSettled
+
+    if isinstance(event, AssetSettled):
+        told = asdict(event)
+        return {"event": "asset", "of": told.pop("total")} | told
     row = asdict(event.row)
     del row["thumbnail"]
     return {"event": "map", "known": event.known, "number": event.number, "of": event.total} | row
 
 
-def _tell_by_line(event: Settled) -> None:
-    row = event.row
-    if row.status == "failed":
-        print(_failure(row), file=sys.stderr, flush=True)
+def _tell_by_line(event: Event) -> None:
+    failure = _failure(event)
+    if failure:
+        print(failure, file=sys.stderr, flush=True)
     elif not event.known:
-        suns = "1 sun" if row.lights == 1 else f"{row.lights} suns"
-        text = f"{row.source}: {suns} with {row.share:.1%} of all light, {row.seconds:.1f} s"
-        print(f"{event.number}/{event.total} {text}", flush=True)
+        print(f"{event.number}/{event.total} {_done(event)}", flush=True)
 
 
-def _failure(row: Row) -> str:
-    return f"sunsplit: {row.source}: {row.sentence}"
+def _failure(event: Event) -> str:
+    """The line for what went wrong; "" where nothing did."""
+    from .library.assets import AssetSettled
+
+    if isinstance(event, AssetSettled):
+        return f"sunsplit: {event.blend}: {event.sentence}" if event.sentence else ""
+    row = event.row
+    return f"sunsplit: {row.source}: {row.sentence}" if row.status == "failed" else ""
+
+
+def _done(event: Event) -> str:
+    from .library.assets import AssetSettled
+
+    if isinstance(event, AssetSettled):
+        return event.blend
+    row = event.row
+    suns = "1 sun" if row.lights == 1 else f"{row.lights} suns"
+    return f"{row.source}: {suns} with {row.share:.1%} of all light, {row.seconds:.1f} s"
 
 
 @contextmanager
@@ -212,23 +250,28 @@ def _bar() -> Iterator[Listener]:
     """A bar on a terminal, with time left and maps a minute."""
     from tqdm import tqdm
 
+    from .library.assets import AssetSettled
+
     form = "{desc} {percentage:3.0f} % |{bar}| {elapsed}, {remaining} left{postfix}"
     bar = tqdm(total=1.0, file=sys.stderr, bar_format=form, smoothing=0, leave=False)
     done, fresh, failed = threading.Event(), 0, 0
 
-    def tell(event: Settled) -> None:
+    def tell(event: Event) -> None:
         nonlocal fresh, failed
-        fresh += not event.known
-        failed += event.row.status == "failed"
-        if event.row.status == "failed":
-            bar.write(_failure(event.row), file=sys.stderr)
+        failure, is_map = _failure(event), not isinstance(event, AssetSettled)
+        fresh += is_map and not event.known
+        failed += bool(failure)
+        if failure:
+            bar.write(failure, file=sys.stderr)
+        fraction = event.fraction if is_map else event.number / event.total
         if event.known:
-            bar.initial = event.fraction  # took no time, and tells nothing of the time left
-        bar.n = event.fraction
-        wrong = f", {failed:,} failed" if failed else ""
-        bar.set_description_str(f"{event.number:,} of {event.total:,} maps{wrong}", refresh=False)
+            bar.initial = fraction  # took no time, and tells nothing of the time left
+        bar.n = fraction
+        what, wrong = "maps" if is_map else "assets", f", {failed:,} failed" if failed else ""
+        bar.set_description_str(f"{event.number:,} of {event.total:,} {what}{wrong}", refresh=False)
         elapsed = bar.format_dict["elapsed"]
-        bar.set_postfix_str(f"{60 * fresh / max(elapsed, 1e-3):,.0f} maps/min", refresh=False)
+        rate = f", {60 * fresh / max(elapsed, 1e-3):,.0f} maps/min" if is_map else ""
+        bar.set_postfix_str(rate.removeprefix(", "), refresh=False)
 
     def paint() -> None:
         while not done.wait(REPAINT):
@@ -254,6 +297,8 @@ def _say_end(result: LibraryResult, seconds: float, as_json: bool) -> None:
             "known": result.known,
             "failed": len(result.failed),
             "unread": list(result.unread),
+            "assets": len(result.assets),
+            "assets_failed": sum(bool(asset.sentence) for asset in result.assets),
             "seconds": seconds,
             "report": str(result.report),
         }
@@ -265,6 +310,11 @@ def _say_end(result: LibraryResult, seconds: float, as_json: bool) -> None:
     parts += [f"{result.known:,} had been converted before"] if result.known else []
     parts += [f"{len(result.failed):,} failed"] if result.failed else []
     print(f"{len(result.rows):,} maps: {', '.join(parts)}, in {seconds:,.1f} s")
+    if result.assets:
+        made = sum(not asset.known and not asset.sentence for asset in result.assets)
+        wrong = sum(bool(asset.sentence) for asset in result.assets)
+        parts = [f"{made:,} made"] + ([f"{wrong:,} with failures"] if wrong else [])
+        print(f"{len(result.assets):,} asset files: {', '.join(parts)}")
     print(f"wrote {result.report}")
 
 

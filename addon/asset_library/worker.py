@@ -35,6 +35,7 @@ def main() -> None:
     with _stdout_to_stderr():
         _find_libraries()
         writing = importlib.import_module(f"{NAME}.addon.asset_library.writing")
+    sys.stdin.readline()  # where others import from: Blender knows better
     serving = importlib.import_module(f"{NAME}.core.library.serving")
     serving.serve(writing.answer)
 

@@ -14,6 +14,7 @@ from ..files import lock
 from ..files.atomic import finish_interrupted
 from ..settings import BadSetting
 from ..version import version
+from .assets import AssetSettled, Converted, blender_command, make_assets
 from .local import Done, LocalWorkers, Task
 from .memory import LEAST, MEGABYTE, memory_of, usable_memory
 from .options import LibraryOptions
@@ -22,6 +23,7 @@ from .processes import converter
 from .records import Row
 from .report import write_report
 from .scan import scan
+from .side_files import SideFacts, facts_beside
 from .state import STATE, is_current_by_times, read_record
 from .work import MapJob, MapResult
 
@@ -46,19 +48,23 @@ log = logging.getLogger("sunsplit")
 """What happens to each map, for pipelines that listen: failures are warnings."""
 log.addHandler(logging.NullHandler())  # else Python prints them where nobody listens
 
-Listener = Callable[[Settled], None]
+Event = Settled | AssetSettled
+
+Listener = Callable[[Event], None]
 """Called in the thread that has called `convert_library`; what it raises ends the run."""
 
 
 @dataclass(frozen=True)
 class LibraryResult:
     """rows: one for each map, in the order of their names. known: how many had been converted
-    before. unread: folders that could not be looked into, as sentences. report: where it lies."""
+    before. unread: folders that could not be looked into, as sentences. report: where it lies.
+    assets: .blend files, if they were asked for."""
 
     rows: tuple[Row, ...]
     known: int
     unread: tuple[str, ...]
     report: Path
+    assets: tuple[AssetSettled, ...] = ()
 
     @property
     def failed(self) -> tuple[Row, ...]:
@@ -66,8 +72,8 @@ class LibraryResult:
 
     @property
     def is_well(self) -> bool:
-        """Whether all maps are converted and all folders were seen."""
-        return not self.failed and not self.unread
+        """Whether all maps are converted, all assets made and all folders seen."""
+        return not (self.failed or self.unread or any(one.sentence for one in self.assets))
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,14 @@ class Planned:
 
     map: PlannedMap
     job: MapJob
+    facts: SideFacts
     row: Row | None
+
+    def with_facts(self, row: Row) -> Row:
+        """A row with what is said of its map beside it."""
+        facts = self.facts
+        warnings = (*row.warnings, *facts.warnings)
+        return replace(row, author=facts.author, licence=facts.licence, warnings=warnings)
 
     @property
     def weight(self) -> float:
@@ -107,34 +120,34 @@ def convert_library(
     *,
     workers: int | None = None,
     memory: int | None = None,
+    blender: str | None = None,
     listen: Listener | None = None,
 ) -> LibraryResult:
     """Convert all maps of a folder that are not converted yet, and write a report.
 
     workers: processes, one for each core by default. memory: bytes that they may hold together, by
-    default three quarters of what is free. A map that cannot be converted is a row of the result;
+    default three quarters of what is free. blender: the program that makes assets, by default the
+    one that is there. A map that cannot be converted is a row of the result;
     what raises ends the run: UnusableInput where there is no such library, CannotWrite where the
     output cannot be written, BadSetting. What was done stays done: called again, it goes on.
     """
-    output = Path(output)
+    output, options = Path(output), options or LibraryOptions()
     workers, memory = _checked(workers, memory)
+    command = blender_command(blender) if options.assets else []
     planned = plan_library(library, output, options)
     with _alone(output):
         _finish_interrupted(output, planned.maps)
-        rows = [each.row for each in planned.maps]
-        known = len(rows) - rows.count(None)
         told = _Told(planned.maps, listen)
-        for number, row in enumerate(rows):
-            if row:
-                told.settled(number, row, True)
-        left = [n for n, row in enumerate(rows) if row is None]
-        for number, result in _converted(planned.maps, left, workers, memory):
-            rows[number] = result.row
-            known += result.known
-            told.settled(number, result.row, result.known)
-        finished = tuple(row for row in rows if row)
-        report, _ = write_report(output, finished, Path(library).resolve().name)
-        return LibraryResult(finished, known, planned.unread, report)
+        rows, known = _all_converted(planned.maps, workers, memory, told)
+        assets = []
+        if options.assets:
+            made = _converted_maps(planned.maps, rows)
+            kind, pack = options.assets, options.pack
+            for asset in make_assets(made, output, kind, pack, command, workers, memory):
+                told.asset(asset)
+                assets.append(asset)
+        report, _ = write_report(output, rows, Path(library).resolve().name)
+        return LibraryResult(tuple(rows), known, planned.unread, report, tuple(assets))
 
 
 def plan_library(
@@ -152,7 +165,8 @@ def plan_library(
     maps = []
     for each in plan(found, options):
         job = _job(library, output, each, options)
-        maps.append(Planned(each, job, _row_of_earlier(job, each)))
+        facts = facts_beside(library / each.file.path, library)
+        maps.append(Planned(each, job, facts, _row_of_earlier(job, each)))
     return LibraryPlan(tuple(maps), found.unread)
 
 
@@ -209,6 +223,36 @@ def _finish_interrupted(output: Path, maps: Sequence[Planned]) -> None:
         finish_interrupted(output / folder)
 
 
+def _all_converted(
+    maps: Sequence[Planned], workers: int, memory: int, told: _Told
+) -> tuple[list[Row], int]:
+    """Rows of all maps, and how many of them had been converted before."""
+    rows: dict[int, Row] = {}
+    known = 0
+
+    def settle(number: int, row: Row, was_known: bool) -> None:
+        nonlocal known
+        known += was_known
+        rows[number] = maps[number].with_facts(row)
+        told.settled(number, rows[number], was_known)
+
+    for number, each in enumerate(maps):
+        if each.row:
+            settle(number, each.row, True)
+    left = [number for number in range(len(maps)) if number not in rows]
+    for number, result in _converted(maps, left, workers, memory):
+        settle(number, result.row, result.known)
+    return [rows[number] for number in range(len(maps))], known
+
+
+def _converted_maps(maps: Sequence[Planned], rows: Sequence[Row]) -> list[Converted]:
+    return [
+        Converted(each.job, each.facts, row.width * row.height)
+        for each, row in zip(maps, rows, strict=True)
+        if row.status == "done"
+    ]
+
+
 def _converted(
     maps: Sequence[Planned], left: Sequence[int], workers: int, memory: int
 ) -> Iterator[tuple[int, MapResult]]:
@@ -248,3 +292,11 @@ class _Told:
         if self._listen:
             total, fraction = len(self._weights), self._weight / self._whole
             self._listen(Settled(row, known, self._number, total, fraction))
+
+    def asset(self, asset: AssetSettled) -> None:
+        if asset.sentence:
+            log.warning("%s: %s", asset.blend, asset.sentence)
+        elif not asset.known:
+            log.info("%s", asset.blend)
+        if self._listen:
+            self._listen(asset)

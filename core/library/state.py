@@ -120,13 +120,18 @@ def read_record(output: Path, name: str) -> Record | None:
 
 
 def write_record(output: Path, name: str, record: Record) -> None:
-    """Raises CannotWrite. It appears whole, but need not survive a power cut."""
-    path = record_path(output, name)
+    """Raises CannotWrite."""
+    write_state(record_path(output, name), output, {"version": VERSION, **asdict(record)})
+
+
+def write_state(path: Path, output: Path, document: dict[str, Any]) -> None:
+    """Write what is to be remembered: whole, but it need not survive a power cut. Raises
+    CannotWrite."""
     draft = path.with_name(f".{secrets.token_hex(8)}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            draft.write_text(json.dumps({"version": VERSION, **asdict(record)}), encoding="utf-8")
+            draft.write_text(json.dumps(document), encoding="utf-8")
             draft.replace(path)
         finally:
             draft.unlink(missing_ok=True)
