@@ -91,6 +91,12 @@ def _add_work(group: argparse._ArgumentGroup) -> None:
         "is free)",
     )
     group.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="let the workers of a Dask cluster convert, such as tcp://10.0.0.1:8786; FOLDER and "
+        "OUT are shared with them under the same paths",
+    )
+    group.add_argument(
         "--dry-run", action="store_true", help="say what would be done, and write nothing"
     )
     group.add_argument(
@@ -129,7 +135,9 @@ def run_library(options: argparse.Namespace) -> int:
                 chosen,
                 workers=options.workers,
                 memory=options.memory,
+                scheduler=options.scheduler,
                 listen=listen,
+                notice=_say_notice,
             )
         except KeyboardInterrupt:
             raise KeyboardInterrupt(
@@ -201,6 +209,13 @@ def _tell_by_line(event: Settled) -> None:
         suns = "1 sun" if row.lights == 1 else f"{row.lights} suns"
         text = f"{row.source}: {suns} with {row.share:.1%} of all light, {row.seconds:.1f} s"
         print(f"{event.number}/{event.total} {text}", flush=True)
+
+
+def _say_notice(sentence: str) -> None:
+    from tqdm import tqdm
+
+    tqdm.write(f"sunsplit: {sentence}", file=sys.stderr)  # above the bar, where there is one
+    sys.stderr.flush()
 
 
 def _failure(row: Row) -> str:

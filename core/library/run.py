@@ -13,6 +13,7 @@ from ..files import lock
 from ..files.atomic import finish_interrupted
 from ..settings import BadSetting
 from ..version import version
+from .cluster import ClusterWorkers, Notice
 from .local import Done, LocalWorkers, Task
 from .memory import LEAST, MEGABYTE, memory_of, usable_memory
 from .options import LibraryOptions
@@ -22,6 +23,8 @@ from .records import Row
 from .scan import scan
 from .state import STATE, is_current_by_times, read_record
 from .work import MapJob, MapResult
+
+Team = Callable[[], "LocalWorkers | ClusterWorkers"]
 
 FIXED, PER_PIXEL = 0.3, 4e-8
 """Seconds that a map takes, about, and for each of its pixels: only for what is told of progress,
@@ -93,17 +96,23 @@ def convert_library(
     *,
     workers: int | None = None,
     memory: int | None = None,
+    scheduler: str | None = None,
     listen: Listener | None = None,
+    notice: Notice | None = None,
 ) -> LibraryResult:
     """Convert all maps of a folder that are not converted yet, and write a report.
 
     workers: processes, one for each core by default. memory: bytes that they may hold together, by
-    default three quarters of what is free. A map that cannot be converted is a row of the result;
-    what raises ends the run: UnusableInput where there is no such library, CannotWrite where the
-    output cannot be written, BadSetting. What was done stays done: called again, it goes on.
+    default three quarters of what is free. scheduler: address of a Dask cluster, whose workers do
+    the work instead; they see both folders under the same paths. notice: called with sentences
+    about the cluster, such as that it has no workers at present.
+
+    A map that cannot be converted is a row of the result; what raises ends the run: UnusableInput
+    where there is no such library, CannotWrite where the output cannot be written, ClusterFailed
+    where a cluster cannot be used, BadSetting. What was done stays done: called again, it goes on.
     """
     output = Path(output)
-    workers, memory = _checked(workers, memory)
+    team = _team(output, workers, memory, scheduler, notice)
     planned = plan_library(library, output, options)
     with _alone(output):
         _finish_interrupted(output, planned.maps)
@@ -114,10 +123,13 @@ def convert_library(
             if row:
                 told.settled(number, row, True)
         left = [n for n, row in enumerate(rows) if row is None]
-        for number, result in _converted(planned.maps, left, workers, memory):
-            rows[number] = result.row
-            known += result.known
-            told.settled(number, result.row, result.known)
+        try:
+            for number, result in _converted(planned.maps, left, team):
+                rows[number] = result.row
+                known += result.known
+                told.settled(number, result.row, result.known)
+        finally:
+            _finish_interrupted(output, planned.maps)
         finished = tuple(row for row in rows if row)
         return LibraryResult(finished, known, planned.unread, None)
 
@@ -139,6 +151,25 @@ def plan_library(
         job = _job(library, output, each, options)
         maps.append(Planned(each, job, _row_of_earlier(job, each)))
     return LibraryPlan(tuple(maps), found.unread)
+
+
+def _team(
+    output: Path,
+    workers: int | None,
+    memory: int | None,
+    scheduler: str | None,
+    notice: Notice | None,
+) -> Team:
+    """What makes those who will do the work."""
+    if scheduler is None:
+        count, limit = _checked(workers, memory)
+        return lambda: LocalWorkers(converter(), count, limit)
+    if workers is not None or memory is not None:
+        raise BadSetting(
+            "--workers and --memory are for work on this machine: with --scheduler, "
+            "`dask worker --nthreads N --memory-limit SIZE` says that for each machine."
+        )
+    return lambda: ClusterWorkers(scheduler, output.absolute(), notice or (lambda _: None))
 
 
 def _checked(workers: int | None, memory: int | None) -> tuple[int, int]:
@@ -195,13 +226,15 @@ def _finish_interrupted(output: Path, maps: Sequence[Planned]) -> None:
 
 
 def _converted(
-    maps: Sequence[Planned], left: Sequence[int], workers: int, memory: int
+    maps: Sequence[Planned], left: Sequence[int], team: Team
 ) -> Iterator[tuple[int, MapResult]]:
     """Numbers of maps, and what became of them, as they come; the largest are begun first."""
     order = sorted(left, key=lambda n: (-maps[n].weight, n))
     tasks = {n: Task(maps[n].job.to_json(), memory_of(maps[n].map.file)) for n in order}
     numbers = {id(task): n for n, task in tasks.items()}
-    with LocalWorkers(converter(), workers, memory) as pool:
+    if not tasks:
+        return
+    with team() as pool:
         for done in pool.run(list(tasks.values())):
             if done:
                 number = numbers[id(done.task)]
