@@ -90,7 +90,7 @@ def _outputs(
 
 
 def _is_part(width: int, whole: int) -> bool:
-    return width <= whole and whole % width == 0
+    return 0 < width <= whole and whole % width == 0
 
 
 def _output(file: MapFile | None, width: int | None, chosen: MapFile) -> Output:

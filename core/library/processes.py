@@ -50,7 +50,8 @@ class Worker:
         )
         self._seen = psutil.Process(self._process.pid)
         self._send({"path": sys.path})
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._listener = threading.Thread(target=self._listen, daemon=True)
+        self._listener.start()
 
     def start(self, job: dict[str, Any]) -> None:
         """Give it a job. If it has died, that is the answer."""
@@ -68,12 +69,7 @@ class Worker:
         """End it at once, whatever it does."""
         self._process.kill()
         self._process.wait()
-
-    def close(self) -> None:
-        """Let it end by itself, as it has nothing to do."""
-        with suppress(OSError):
-            if self._process.stdin:
-                self._process.stdin.close()
+        self._listener.join()
 
     def ending(self) -> str:
         """How it has ended, in words."""
@@ -82,13 +78,18 @@ class Worker:
 
     def _send(self, what: dict[str, Any]) -> None:
         assert self._process.stdin is not None
-        with suppress(BrokenPipeError):
+        # Where it has ended, and its pipes are closed, `_listen` says so.
+        with suppress(BrokenPipeError, ValueError):
             self._process.stdin.write(json.dumps(what) + "\n")
             self._process.stdin.flush()
 
     def _listen(self) -> None:
         assert self._process.stdout is not None
-        for line in self._process.stdout:
-            self._on_answer(self, json.loads(line))
+        assert self._process.stdin is not None
+        with self._process.stdout as answers:
+            for line in answers:
+                self._on_answer(self, json.loads(line))
         self._process.wait()
+        with suppress(BrokenPipeError):  # what it was told and has not read
+            self._process.stdin.close()
         self._on_answer(self, None)

@@ -7,7 +7,7 @@ import re
 _TOKEN = r"(?P<thousands>\d{1,2})k|(?P<width>\d{3,5})(?:x(?P<height>\d{3,5}))?"
 _IN_NAME = re.compile(rf"(?:^|[-_. (\[])(?:{_TOKEN})(?=$|[-_. )\]])", re.IGNORECASE)
 _WHOLE = re.compile(_TOKEN, re.IGNORECASE)
-_LEFT_OVER = re.compile(r"[-_. ]*[(\[]\s*[)\]]|^[-_. ]+|[-_. ]+$|(?<=[-_. ])[-_. ]+")
+_LEFT_OVER = re.compile(r"^[-_. ]+|[-_. ]+$|(?<=[-_. ])[-_. ]+")
 """What is left of separators where a size was taken out."""
 
 
@@ -19,8 +19,9 @@ def name_without_size(stem: str, width: int) -> str:
     """
     for found in reversed(list(_IN_NAME.finditer(stem))):
         if _is_width(found, width):
-            rest = _LEFT_OVER.sub("", stem[: found.start()] + stem[found.end() :])
-            return rest or stem
+            in_brackets = stem[found.start()] in "([" and stem[found.end() :][:1] in ")]"
+            rest = stem[: found.start()] + stem[found.end() + in_brackets :]
+            return _LEFT_OVER.sub("", rest) or stem
     return stem
 
 
