@@ -23,6 +23,7 @@ class Cluster:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._processes: list[Process] = []
+        self._workers: list[Process] = []
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self._port = free.getsockname()[1]
@@ -56,8 +57,16 @@ class Cluster:
         arguments = ["distributed.cli.dask_worker", self.address, "--nthreads", str(threads)]
         arguments += ["--nanny" if nanny else "--no-nanny", "--local-directory", str(self._folder)]
         process = self._started([*arguments, *options], before, environment)
+        self._workers.append(process)
         process.wait_for("Registered to")
         return process
+
+    def dismiss_workers(self) -> None:
+        """Kill them all. When this returns, the one scheduler that has been started knows it."""
+        for worker in self._workers:
+            worker.kill()
+        scheduler = self._processes[0]
+        wait(lambda: scheduler.said().count("Remove worker") >= len(self._workers))
 
     def _started(
         self,

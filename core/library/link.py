@@ -111,11 +111,11 @@ class Link:
             raise Lost from error
 
     def find(self, worker: str, name: str) -> Call:
-        """Ask a worker for what has this name, "module:name"; it stays there."""
+        """Ask a worker for what has this name, "module:name"; it stays there. Raises Lost."""
         return self._asked(worker, False, pkgutil.resolve_name, name)
 
     def call(self, found: Call, *arguments: object) -> Call:
-        """Ask a worker to call what it has found."""
+        """Ask a worker to call what it has found. Raises Lost."""
         return self._asked(found.worker, True, operator.call, found.future, *arguments)
 
     def forget(self, call: Call) -> None:
@@ -125,12 +125,15 @@ class Link:
                 call.future.cancel()
 
     def _asked(self, worker: str, with_value: bool, function: object, *arguments: object) -> Call:
-        if self._client is None:
+        if self._client is None or self._client.status != "running":
             raise Lost
         key = f"sunsplit-{secrets.token_hex(8)}"
-        future = self._client.submit(
-            function, *arguments, key=key, workers=[worker], allow_other_workers=False
-        )
+        try:
+            future = self._client.submit(
+                function, *arguments, key=key, workers=[worker], allow_other_workers=False
+            )
+        except CancelledError as error:  # what was found is forgotten, with its scheduler
+            raise Lost from error
         call = Call(worker, future)
         self._client.loop.add_callback(self._listen, call, with_value)
         return call

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import gc
 import os
-import time
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -16,14 +15,8 @@ from typing import Any
 
 from ..version import version
 from .processes import ONE_CORE
-from .state import STATE
+from .run_token import has_token
 from .work import MapJob, convert_map
-
-TOKEN = "run"
-"""The file in an output's hidden folder that tells its run from all others."""
-
-SIGHT = 2.0
-"""Seconds until a network's file system surely shows what another machine has written before."""
 
 Answer = dict[str, Any]
 """Either result: a `MapResult` as JSON; or obstacle: why this worker cannot do anything for the
@@ -39,7 +32,7 @@ def convert(job: dict[str, Any], token: str) -> Answer:
             install=True,
         )
     library, output = Path(job["library"]), Path(job["output"])
-    if not _is_run_of(output, token):
+    if not has_token(output, token):
         return _obstacle(f"does not see the folder {output} that is to be shared under this path")
     if not _holds_anything(library):
         return _obstacle(f"does not see the folder {library} that is to be shared under this path")
@@ -52,20 +45,6 @@ def convert(job: dict[str, Any], token: str) -> Answer:
 
 def _obstacle(sentence: str, install: bool = False) -> Answer:
     return {"obstacle": sentence, "install": install}
-
-
-def _is_run_of(output: Path, token: str) -> bool:
-    """Whether the run still lasts, and its output is the folder that is seen here."""
-    end = time.monotonic() + SIGHT
-    while True:
-        try:
-            if (output / STATE / TOKEN).read_text(encoding="utf-8") == token:
-                return True
-        except (OSError, ValueError):
-            pass
-        if time.monotonic() > end:
-            return False
-        time.sleep(0.1)
 
 
 def _holds_anything(folder: Path) -> bool:

@@ -37,7 +37,7 @@ MOUNTS = os.name == "posix" and not subprocess.call(
 
 ARGUMENTS = ("--method", "median-cut", "--lights", "8", "--share", "0.3")
 
-COUNT = 24
+COUNT = 18
 
 
 @pytest.fixture(scope="module")
@@ -118,6 +118,20 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
         yield made
 
 
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    with Cluster(tmp_path_factory.mktemp("cluster")) as made:
+        made.scheduler()
+        yield made
+
+
+@pytest.fixture
+def team(shared: Cluster) -> Iterator[Cluster]:
+    """A scheduler that runs, without workers so far."""
+    yield shared
+    shared.dismiss_workers()
+
+
 @pytest.fixture(autouse=True)
 def _short_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     patience = replace(under_test.PATIENCE, other_worker=1.0, notice=0.5)
@@ -143,13 +157,12 @@ def kill_while_it_writes(worker: Process, output: Path) -> None:
         worker.go_on()
 
 
-def test_many_small_maps_with_a_worker_killed(cluster, tmp_path):
+def test_many_small_maps_with_a_worker_killed(team, tmp_path):
     many, output = tmp_path / "maps", tmp_path / "out"
     write_maps(many, 200, 32)
-    cluster.scheduler()
-    cluster.worker(threads=3)
-    nanny = cluster.worker(nanny=True)
-    run = Run(many, output, cluster.address, QUICK)
+    team.worker(threads=2)
+    nanny = team.worker(nanny=True)
+    run = Run(many, output, team.address, QUICK)
     wait(lambda: len(run.settled) > 20)
     nanny.child().kill()
     result = run.ended()
@@ -157,7 +170,7 @@ def test_many_small_maps_with_a_worker_killed(cluster, tmp_path):
     assert (len(result.rows), result.known) == (200, 0)
     assert [event.number for event in run.settled] == list(range(1, 201))
     assert not drafts(output)
-    again = convert_library(many, output, QUICK, scheduler=cluster.address)
+    again = convert_library(many, output, QUICK, scheduler=team.address)
     assert again.known == 200
     assert convert_library(many, tmp_path / "local", some("17"), workers=2).is_well
     of_this_machine = contents(tmp_path / "local")
@@ -165,35 +178,33 @@ def test_many_small_maps_with_a_worker_killed(cluster, tmp_path):
     assert of_this_machine.items() <= contents(output).items()
 
 
-def test_worker_killed_while_it_writes(cluster, tmp_path, maps, local):
+def test_worker_killed_while_it_writes(team, tmp_path, maps, local):
     output = tmp_path / "out"
-    cluster.scheduler()
-    first = cluster.worker()
-    run = Run(maps, output, cluster.address, QUICK)
+    first = team.worker()
+    run = Run(maps, output, team.address, QUICK)
     wait(lambda: run.settled)
     kill_while_it_writes(first, output)
     assert drafts(output)
     wait(lambda: run.notices)
     assert "has no workers: waiting for some" in run.notices[0]
-    cluster.worker()
+    team.worker()
     result = run.ended()
     assert result.is_well
     assert result.known == 0
     check(output, local)
 
 
-def test_map_over_which_workers_die(cluster, tmp_path, maps, local):
+def test_map_over_which_workers_die(team, tmp_path, maps, local):
     output = tmp_path / "out"
-    cluster.scheduler()
-    run = Run(maps, output, cluster.address, some("07"))
+    run = Run(maps, output, team.address, some("07"))
     for _ in range(DEATHS):
-        kill_while_it_writes(cluster.worker(), output)
+        kill_while_it_writes(team.worker(), output)
     (row,) = run.ended().failed
     assert row.sentence.startswith("3 workers have died over it, tcp://127.0.0.1:")
     assert not drafts(output)
     assert not contents(output)
-    cluster.worker()
-    assert convert_library(maps, output, some("07"), scheduler=cluster.address).is_well
+    team.worker()
+    assert convert_library(maps, output, some("07"), scheduler=team.address).is_well
     check(output, local, "07")
 
 
@@ -249,7 +260,7 @@ maps it cannot do."""
 
 
 @pytest.mark.skipif(not MOUNTS, reason="a process cannot have mounts of its own here")
-def test_workers_that_do_not_share_the_folders(cluster, tmp_path, monkeypatch):
+def test_workers_that_do_not_share_the_folders(team, tmp_path, monkeypatch):
     patient = replace(under_test.PATIENCE, files=0.3, other_worker=0.3)
     monkeypatch.setattr(under_test, "PATIENCE", patient)
     mounts, places = [], {}
@@ -262,38 +273,36 @@ def test_workers_that_do_not_share_the_folders(cluster, tmp_path, monkeypatch):
         write_hdr(folders["maps"] / "noon" / "m.hdr", sunny(32))
         mounts.append(mount.format(**folders))
         places[name] = folders, sentence.format(**folders)
-    cluster.scheduler()
-    blind = cluster.worker(before=mounts)
+    blind = team.worker(before=mounts)
     for name, (folders, sentence) in places.items():
-        result = convert_library(*folders.values(), QUICK, scheduler=cluster.address)
+        result = convert_library(*folders.values(), QUICK, scheduler=team.address)
         assert len(result.failed) == BLIND[name][2], name
         for row in result.failed:
             assert row.sentence.startswith("No worker can do it: tcp://127.0.0.1:")
             assert sentence in row.sentence
     assert not list(blind.sees(places["other"][0]["out"]).iterdir())
-    cluster.worker()
+    team.worker()
     for name, (folders, sentence) in places.items():
-        run = Run(*folders.values(), cluster.address, QUICK)
+        run = Run(*folders.values(), team.address, QUICK)
         assert run.ended().is_well
         assert any(sentence in notice for notice in run.notices) == (name in ("nothing", "other"))
         assert not drafts(folders["out"])
         assert contents(folders["out"]) == contents(places["nothing"][0]["out"])
 
 
-def test_workers_with_another_sunsplit(cluster, tmp_path, maps, local):
+def test_workers_with_another_sunsplit(team, tmp_path, maps, local):
     output = tmp_path / "out"
     empty = tmp_path / "empty" / "sunsplit"
     empty.mkdir(parents=True)
     (empty / "__init__.py").touch()
-    cluster.scheduler()
-    cluster.worker(PYTHONPATH=str(other_version(tmp_path / "other", "0.0.9")))
+    team.worker(PYTHONPATH=str(other_version(tmp_path / "other", "0.0.9")))
     with pytest.raises(ClusterFailed, match=r"has Sunsplit 0\.0\.9, and .* was asked for: install"):
-        convert_library(maps, output, QUICK, scheduler=cluster.address)
-    cluster.worker(PYTHONPATH=str(empty.parent))
+        convert_library(maps, output, QUICK, scheduler=team.address)
+    team.worker(PYTHONPATH=str(empty.parent))
     with pytest.raises(ClusterFailed, match=r"\(1 more cannot either\)\.$"):
-        convert_library(maps, output, QUICK, scheduler=cluster.address)
-    cluster.worker()
-    run = Run(maps, output, cluster.address, some("2"))
+        convert_library(maps, output, QUICK, scheduler=team.address)
+    team.worker()
+    run = Run(maps, output, team.address, some("2"))
     assert run.ended().is_well
     assert len(run.notices) <= 2
     assert any("cannot use Sunsplit (ModuleNotFoundError" in notice for notice in run.notices)
@@ -326,19 +335,18 @@ def test_no_scheduler_and_no_workers(cluster, tmp_path, maps):
     assert "has no workers: waiting for some" in run.notices[0]
 
 
-def test_command_line_and_a_bug_on_a_worker(cluster, tmp_path, maps, local):
+def test_command_line_and_a_bug_on_a_worker(team, tmp_path, maps, local):
     output = tmp_path / "out"
-    at = ("--scheduler", cluster.address, "--include", "*1.hdr", "--include", "*1.exr")
-    cluster.scheduler()
-    cluster.worker(threads=2)
+    at = ("--scheduler", team.address, "--include", "*1.hdr", "--include", "*1.exr")
+    team.worker(threads=2)
     done = sunsplit("library", maps, "-o", output, *at, *ARGUMENTS, "--json")
     assert (done.returncode, done.stderr) == (0, "")
     events = [json.loads(line) for line in done.stdout.splitlines()]
-    assert [event["event"] for event in events] == ["map"] * 3 + ["end"]
+    assert [event["event"] for event in events] == ["map"] * 2 + ["end"]
     check(output, local, "1")
     good = plan_library(maps, output, some("2")).maps[0].job.to_json()
     bad = good | {"path": "no\0name.hdr"}  # which the plan would never make
-    with ClusterWorkers(cluster.address, output, print) as workers:
+    with ClusterWorkers(team.address, output, print) as workers:
         done = [done for done in workers.run([Task(bad, 0), Task(good, 0)]) if done]
     raised = next(each for each in done if each.answer is None)
     assert raised.task.job == bad
@@ -346,11 +354,10 @@ def test_command_line_and_a_bug_on_a_worker(cluster, tmp_path, maps, local):
     assert len(done) == 2
 
 
-def test_interrupt(cluster, tmp_path, maps, local):
+def test_interrupt(team, tmp_path, maps, local):
     output = tmp_path / "out"
-    cluster.scheduler()
-    cluster.worker()
-    command = [*COMMAND, "library", maps, "-o", output, "--scheduler", cluster.address, *ARGUMENTS]
+    team.worker()
+    command = [*COMMAND, "library", maps, "-o", output, "--scheduler", team.address, *ARGUMENTS]
     with subprocess.Popen(command, stdout=-1, stderr=-1, text=True) as run:
         assert f"1/{COUNT} " in run.stdout.readline()
         run.send_signal(signal.SIGINT)
@@ -362,7 +369,7 @@ def test_interrupt(cluster, tmp_path, maps, local):
     wait(lambda: not drafts(output))  # what was begun comes to its end
     lights = {name for name in contents(output) if name.endswith(".lights.json")}
     assert len(lights) < COUNT
-    again = convert_library(maps, output, QUICK, scheduler=cluster.address)
+    again = convert_library(maps, output, QUICK, scheduler=team.address)
     assert again.is_well
     assert again.known >= len(lights) - 1
     check(output, local)
