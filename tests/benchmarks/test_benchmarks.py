@@ -17,6 +17,7 @@ from tests.benchmarks import (
     eevee,
     eevee_report,
     equal_error,
+    library_cluster,
     light_tree,
     lights,
     looking,
@@ -223,3 +224,11 @@ def test_shares(tmp_path, monkeypatch, sunrise):
     error = {(one.target, one.share): one.error for one in results}
     assert error["export", None] < error["export", 0.0]
     assert error["cycles", None] < error["cycles", 0.0]
+
+
+def test_library_cluster(tmp_path):
+    pytest.importorskip("distributed")
+    results = library_cluster.main(["--count", "12", "-o", str(tmp_path)])
+    assert [(one.maps, one.failed) for one in results] == [(12, 0)] * 5
+    lines = (tmp_path / "library_cluster.md").read_text().splitlines()
+    assert len([line for line in lines if line.startswith("| ")]) == 2 + len(results)
