@@ -133,7 +133,7 @@ class ClusterWorkers:
         self._notice(f"The scheduler at {address} is lost: {wait:g} s for it to come back.")
         end = time.monotonic() + wait
         for worker in list(self._crew.workers):
-            self._crew.dropped(worker)
+            self._dropped(worker)
         while not self._link.connect():
             if time.monotonic() > end:
                 raise ClusterFailed(
@@ -154,7 +154,7 @@ class ClusterWorkers:
         self._looked, known = now, self._crew.workers
         there = self._link.workers()
         for address in known.keys() - there.keys():
-            for each in self._crew.dropped(address):
+            for each in self._dropped(address):
                 each.has_killed(address)
         for address in there.keys() - known.keys():
             known[address] = ClusterWorker(there[address], self._link.find(address, CONVERT))
@@ -187,6 +187,13 @@ class ClusterWorkers:
                 raise
             worker.busy[call] = each
 
+    def _dropped(self, address: str) -> list[ClusterMap]:
+        """Forget a worker, and let Dask forget what it was at: another one will do that."""
+        worker = self._crew.workers[address]
+        for call in (*worker.busy, worker.found):
+            self._link.forget(call)
+        return self._crew.dropped(address)
+
     def _refuse(self, address: str, sentence: str, install: bool) -> None:
         worker = self._crew.workers[address]
         if not worker.refusal:
@@ -210,7 +217,7 @@ class ClusterWorkers:
         if worker is None or (call is not worker.found and call not in worker.busy):
             return None  # of a worker that was given up
         if isinstance(error, Cancelled):  # not by us: the scheduler knows its worker no more
-            self._crew.dropped(call.worker)
+            self._dropped(call.worker)
             return None
         if call is worker.found:
             self._after_greeting(worker, call.worker, error)

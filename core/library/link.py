@@ -153,7 +153,7 @@ class Link:
         if isinstance(error, (CancelledError, asyncio.CancelledError)):
             error = Cancelled()
         elif isinstance(error, KilledWorker):
-            error = Died()
+            error = Died("it dies of that")
         self.heard.put((call, value, error))
 
 
