@@ -41,13 +41,14 @@ Notice = Callable[[str], None]
 @dataclass(frozen=True)
 class Patience:
     """Seconds to wait: for the scheduler at first, and until it is back; until it is said that
-    there are no workers, and until that ends the run; for a worker that can do what others could
-    not; until written files are seen here, too."""
+    there are no workers, and until that ends the run; until it is said that a worker does not
+    answer; for a worker that can do what others could not; until written files are seen here."""
 
     scheduler: float = 10.0
     back: float = 60.0
     notice: float = 5.0
     workers: float = 300.0
+    greeting: float = 30.0
     other_worker: float = 10.0
     files: float = 60.0
 
@@ -80,12 +81,18 @@ class ClusterWorkers:
         self._looked = 0.0
         self._without_since: float | None = None
         self._has_said_none = False
+        self._silent: set[str] = set()
 
     def __enter__(self) -> ClusterWorkers:
         try:
             self._link.open()
             self._token = set_token(self._output)
             self._connect()
+            if self._link.mismatches:
+                self._notice(
+                    "Python, Dask or what it needs is not the same version on all machines, which "
+                    "may not work: install the same everywhere."
+                )
         except BaseException:
             self._close()
             raise
@@ -157,11 +164,23 @@ class ClusterWorkers:
             for each in self._dropped(address):
                 each.has_killed(address)
         for address in there.keys() - known.keys():
-            known[address] = ClusterWorker(there[address], self._link.find(address, CONVERT))
+            found = self._link.find(address, CONVERT)
+            known[address] = ClusterWorker(there[address], found, now)
+        self._tell_of_silent_ones(now)
         if known:
             self._without_since = None
         else:
             self._wait_for_workers(now)
+
+    def _tell_of_silent_ones(self, now: float) -> None:
+        limit = self._patience.greeting
+        for address, worker in self._crew.workers.items():
+            if not worker.is_ready and worker.since + limit < now and address not in self._silent:
+                self._silent.add(address)
+                self._notice(
+                    f"The worker {address} has not answered for {limit:g} s: it is busy with other "
+                    "work, or has another Dask than the scheduler."
+                )
 
     def _wait_for_workers(self, now: float) -> None:
         self._without_since = now if self._without_since is None else self._without_since

@@ -32,11 +32,12 @@ class ClusterMap:
 
 @dataclass(eq=False)
 class ClusterWorker:
-    """found: the call that looks for Sunsplit there. refusal: why nothing can be done there.
-    install: whether that is for want of the right Sunsplit. busy: what it is at."""
+    """found: the call that looks for Sunsplit there. since: when that was made.
+    refusal: why nothing can be done there. install: whether that is for want of the right Sunsplit. busy: what it is at."""
 
     threads: int
     found: Call
+    since: float
     is_ready: bool = False
     refusal: str = ""
     install: bool = False

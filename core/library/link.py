@@ -11,6 +11,7 @@ import operator
 import pkgutil
 import queue
 import secrets
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
@@ -57,11 +58,15 @@ Heard = tuple[Call, Any, BaseException | None]
 
 
 class Link:
-    """A client of the scheduler at an address. To be closed, which cancels what is not done."""
+    """A client of the scheduler at an address. To be closed, which cancels what is not done.
+
+    mismatches: of versions of Python, Dask and what it needs, on the machines that there are.
+    """
 
     def __init__(self, address: str) -> None:
         self.address = address
         self.heard: queue.SimpleQueue[Heard] = queue.SimpleQueue()
+        self.mismatches: list[Warning] = []
         self._client: Client | None = None
         self._quiet = ExitStack()
 
@@ -78,16 +83,18 @@ class Link:
     def connect(self) -> bool:
         """Try once. Raises ClusterFailed where that is no address."""
         from distributed import Client
+        from distributed.versions import VersionMismatchWarning
 
         self._leave()
         try:
-            self._client = Client(
-                self.address,
-                timeout=CONNECT,
-                name="sunsplit",
-                set_as_default=False,
-                direct_to_workers=False,
-            )
+            with _without(VersionMismatchWarning) as self.mismatches:
+                self._client = Client(
+                    self.address,
+                    timeout=CONNECT,
+                    name="sunsplit",
+                    set_as_default=False,
+                    direct_to_workers=False,
+                )
         except (OSError, TimeoutError):
             return False
         except (ValueError, TypeError, ImportError) as error:
@@ -164,6 +171,20 @@ def _refuse_without_dask() -> None:
         raise ClusterFailed(
             'A cluster needs Dask, which is not installed: pip install "sunsplit[cluster]".'
         ) from error
+
+
+@contextmanager
+def _without(kind: type[Warning]) -> Iterator[list[Warning]]:
+    """The warnings of this kind, which are not shown, when the block has ended."""
+    found: list[Warning] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", kind)
+        yield found
+    for each in caught:
+        if issubclass(each.category, kind):
+            found.append(each.message)
+        else:
+            warnings.warn_explicit(each.message, each.category, each.filename, each.lineno)
 
 
 @contextmanager
