@@ -33,7 +33,8 @@ class ClusterMap:
 @dataclass(eq=False)
 class ClusterWorker:
     """found: the call that looks for Sunsplit there. since: when that was made.
-    refusal: why nothing can be done there. install: whether that is for want of the right Sunsplit. busy: what it is at."""
+    refusal: why nothing can be done there. install: whether that is for want of the right
+    Sunsplit. busy: what it is at."""
 
     threads: int
     found: Call
