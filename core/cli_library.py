@@ -23,7 +23,9 @@ from .library.options import LARGEST, Assets, LibraryOptions
 from .library.sizes import size_name, width_of
 
 if TYPE_CHECKING:  # imported where they are used: `--help` must not wait for them
-    from .library.run import Event, LibraryPlan, LibraryResult, Listener, Planned
+    from .library.events import Event, Listener
+    from .library.planned import LibraryPlan, Planned
+    from .library.run import LibraryResult
 
 REPAINT = 0.5
 """Seconds between two paintings of the bar: time runs while a large map is converted."""
@@ -91,6 +93,12 @@ def _add_work(group: argparse._ArgumentGroup) -> None:
         "is free)",
     )
     group.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="let the workers of a Dask cluster convert, such as tcp://10.0.0.1:8786; FOLDER and "
+        "OUT are shared with them under the same paths",
+    )
+    group.add_argument(
         "--dry-run", action="store_true", help="say what would be done, and write nothing"
     )
     group.add_argument(
@@ -113,8 +121,9 @@ def _add_assets(group: argparse._ArgumentGroup) -> None:
 
 
 def run_library(options: argparse.Namespace) -> int:
-    from .library.assets import AssetSettled
-    from .library.run import convert_library, plan_library
+    from .library.events import AssetSettled
+    from .library.planned import plan_library
+    from .library.run import convert_library
 
     chosen = LibraryOptions(
         settings=settings_from(options),
@@ -147,8 +156,10 @@ def run_library(options: argparse.Namespace) -> int:
                 chosen,
                 workers=options.workers,
                 memory=options.memory,
+                scheduler=options.scheduler,
                 blender=options.blender or options.own_blender,
                 listen=listen,
+                notice=_say_notice,
             )
         except KeyboardInterrupt:
             raise KeyboardInterrupt(
@@ -207,7 +218,7 @@ def _telling(as_json: bool) -> Iterator[Listener]:
 
 
 def _settled_as_dict(event: Event) -> dict[str, Any]:
-    from .library.assets import AssetSettled
+    from .library.events import AssetSettled
 
     if isinstance(event, AssetSettled):
         told = asdict(event)
@@ -227,7 +238,7 @@ def _tell_by_line(event: Event) -> None:
 
 def _failure(event: Event) -> str:
     """The line for what went wrong; "" where nothing did."""
-    from .library.assets import AssetSettled
+    from .library.events import AssetSettled
 
     if isinstance(event, AssetSettled):
         return f"sunsplit: {event.blend}: {event.sentence}" if event.sentence else ""
@@ -236,7 +247,7 @@ def _failure(event: Event) -> str:
 
 
 def _done(event: Event) -> str:
-    from .library.assets import AssetSettled
+    from .library.events import AssetSettled
 
     if isinstance(event, AssetSettled):
         return event.blend
@@ -245,12 +256,19 @@ def _done(event: Event) -> str:
     return f"{row.source}: {suns} with {row.share:.1%} of all light, {row.seconds:.1f} s"
 
 
+def _say_notice(sentence: str) -> None:
+    from tqdm import tqdm
+
+    tqdm.write(f"sunsplit: {sentence}", file=sys.stderr)  # above the bar, where there is one
+    sys.stderr.flush()
+
+
 @contextmanager
 def _bar() -> Iterator[Listener]:
     """A bar on a terminal, with time left and maps a minute."""
     from tqdm import tqdm
 
-    from .library.assets import AssetSettled
+    from .library.events import AssetSettled
 
     form = "{desc} {percentage:3.0f} % |{bar}| {elapsed}, {remaining} left{postfix}"
     bar = tqdm(total=1.0, file=sys.stderr, bar_format=form, smoothing=0, leave=False)

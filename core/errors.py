@@ -11,3 +11,7 @@ class UnusableInput(SunsplitError):
 
 class CannotWrite(SunsplitError):
     """The result could not be written; what was there before is still there."""
+
+
+class ClusterFailed(SunsplitError):
+    """The machines that were to work cannot be reached or used; what they have done stays done."""

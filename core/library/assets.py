@@ -16,6 +16,7 @@ from ..files.belonging import sha256
 from ..settings import BadSetting
 from ..version import version
 from .catalogues import write_catalogues
+from .events import AssetSettled
 from .local import LocalWorkers, Task
 from .memory import MEGABYTE
 from .options import Assets
@@ -28,23 +29,6 @@ BLENDER = 700 * MEGABYTE
 
 PER_PIXEL = 24
 """Bytes for each pixel of a map that Blender loads to render it."""
-
-
-@dataclass(frozen=True)
-class AssetSettled:
-    """A .blend file of which nothing more is to be done.
-
-    blend: its path from the output's folder, with slashes. sources: the maps in it, from the
-    library's. known: whether it had been made before. sentence: why it could not be made, or which
-    maps are not in it; "" where all is well. number: of files that are settled, out of `total`.
-    """
-
-    blend: str
-    sources: tuple[str, ...]
-    known: bool
-    sentence: str
-    number: int
-    total: int
 
 
 @dataclass(frozen=True)
@@ -94,14 +78,12 @@ def make_assets(
     output: Path,
     kind: Assets,
     pack: bool,
-    command: Sequence[str],
-    workers: int,
-    memory: int,
+    makers: LocalWorkers,
 ) -> Iterator[AssetSettled]:
     """Make .blend files of maps, but for those that are there already, and state their catalogues.
 
     kind: a file for "each" map, beside its conversion, or "one" in the output's folder, of its
-    name. Raises CannotWrite.
+    name. makers: processes of `blender_command`. Raises CannotWrite.
     """
     catalogues = {asset["catalogue"] for asset in (each.asset(pack) for each in maps)}
     write_catalogues(output, sorted(filter(None, catalogues)))
@@ -117,7 +99,7 @@ def make_assets(
             left.append(file)
     tasks = [Task(file.job, file.memory) for file in left]
     of_task = {id(task): file for task, file in zip(tasks, left, strict=True)}
-    with LocalWorkers(command, workers, memory) as pool:
+    with makers as pool:
         for done in pool.run(tasks):
             if done is None:
                 continue

@@ -5,12 +5,13 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import os
 import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from ..errors import SunsplitError, UnusableInput
+from ..errors import CannotWrite, SunsplitError, UnusableInput
 from ..settings import ConversionSettings
 from ..tolerances import ACCOUNT
 from ..version import version
@@ -78,14 +79,18 @@ class MapJob:
         )
 
 
+Obstacle = Literal["unseen", "unwritable", "memory"]
+
+
 @dataclass(frozen=True)
 class MapResult:
-    """row: for the report. known: whether it had been converted before. unseen: whether the map
-    was not there, as on a machine that does not see the library."""
+    """row: for the report. known: whether it had been converted before. obstacle: what of this
+    machine stood in the way, so that another one may do it: the map was not there ("unseen"), the
+    output could not be written ("unwritable"), or it has not "memory" enough."""
 
     row: Row
     known: bool = False
-    unseen: bool = False
+    obstacle: Obstacle | None = None
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)
@@ -101,6 +106,7 @@ def convert_map(job: MapJob) -> MapResult:
     started = time.perf_counter()
     output = Path(job.output)
     row = Row(source=job.path, status="failed", variants=job.others)
+    obstacle: Obstacle | None = None
     try:
         _refuse_other_version(job)
         record = _record_of_today(job)
@@ -112,12 +118,17 @@ def convert_map(job: MapJob) -> MapResult:
         return MapResult(record.row)
     except SunsplitError as error:
         sentence = " ".join(str(error).split())
+        obstacle = _obstacle(job, error)
     except MemoryError:
-        sentence = f"{job.path} does not fit into memory."
+        sentence, obstacle = f"{job.path} does not fit into memory.", "memory"
     seconds = time.perf_counter() - started
-    return MapResult(
-        replace(row, sentence=sentence, seconds=seconds), unseen=not job.source.exists()
-    )
+    return MapResult(replace(row, sentence=sentence, seconds=seconds), obstacle=obstacle)
+
+
+def _obstacle(job: MapJob, error: SunsplitError) -> Obstacle | None:
+    if isinstance(error, CannotWrite):
+        return "unwritable"
+    return None if os.access(job.source, os.R_OK) else "unseen"
 
 
 def _refuse_other_version(job: MapJob) -> None:

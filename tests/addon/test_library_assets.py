@@ -10,7 +10,8 @@ import bpy
 import pytest
 
 from sunsplit.core import LibraryOptions, cli, convert_library
-from sunsplit.core.library.assets import AssetSettled, blender_command
+from sunsplit.core.library.assets import blender_command
+from sunsplit.core.library.events import AssetSettled
 from sunsplit.core.settings import BadSetting
 from tests.files import sunny, write_exr, write_hdr
 

@@ -17,6 +17,7 @@ from tests.benchmarks import (
     eevee,
     eevee_report,
     equal_error,
+    library_cluster,
     library_report,
     light_tree,
     lights,
@@ -235,3 +236,11 @@ def test_library_report(tmp_path, sunrise):
     assert min(results[0].busy) < results[0].bar
     lines = (tmp_path / "library_report.md").read_text().splitlines()
     assert sum(line.startswith("| ") for line in lines) == 2 + len(results)
+
+
+def test_library_cluster(tmp_path):
+    pytest.importorskip("distributed")
+    results = library_cluster.main(["--count", "12", "-o", str(tmp_path)])
+    assert [(one.maps, one.failed) for one in results] == [(12, 0)] * 5
+    lines = (tmp_path / "library_cluster.md").read_text().splitlines()
+    assert len([line for line in lines if line.startswith("| ")]) == 2 + len(results)
