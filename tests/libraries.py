@@ -12,6 +12,8 @@ import numpy as np
 from sunsplit.core.library.state import STATE
 from tests.files import noise, sunny, write_exr, write_hdr
 
+REPORT = ("report.html", "report.csv")
+
 
 def write_maps(folder: Path, count: int, width: int = 64) -> list[str]:
     """Maps that all differ, in three folders and both formats; their paths, in order."""

@@ -13,7 +13,7 @@ import pytest
 
 from sunsplit.core import cli
 from sunsplit.core.library.state import SETTLED
-from tests.files import COMMAND, noise, sunny, sunsplit, write_exr
+from tests.files import COMMAND, noise, radiance_head, sunny, sunsplit, write_exr
 from tests.libraries import documents, write_maps
 
 COUNT = 4
@@ -180,7 +180,8 @@ def test_a_terminal_gets_a_bar_with_time_left_and_throughput(tmp_path, out):
     library = tmp_path / "many"
     library.mkdir()
     write_maps(library, 30)
-    (library / "bad.hdr").touch()
+    # Large by its header, and so begun first.
+    (library / "bad.hdr").write_bytes(radiance_head("-Y 512 +X 1024") + bytes(2048))
     master, slave = pty.openpty()
     termios.tcsetwinsize(slave, (24, 100))
     process = subprocess.Popen(

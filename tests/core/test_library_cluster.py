@@ -27,7 +27,7 @@ from sunsplit.core.library.run import LibraryResult, convert_library
 from sunsplit.core.settings import ConversionSettings
 from tests.dask_cluster import Cluster, Process, wait
 from tests.files import COMMAND, noise, sunny, sunsplit, write_hdr
-from tests.libraries import contents, write_maps
+from tests.libraries import REPORT, contents, write_maps
 
 pytest.importorskip("distributed")
 
@@ -55,7 +55,7 @@ def local(maps: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, byt
     """What this machine makes of it."""
     output = tmp_path_factory.mktemp("local")
     assert convert_library(maps, output, QUICK, workers=2).is_well
-    return contents(output)
+    return conversions(output)
 
 
 def some(last: str) -> LibraryOptions:
@@ -67,8 +67,13 @@ def check(output: Path, local: dict[str, bytes], last: str = "") -> None:
     """The cluster's files are those of this machine, byte for byte, and nothing else is there."""
     expected = {name: data for name, data in local.items() if name.split(".")[0].endswith(last)}
     assert expected
-    assert contents(output) == expected
+    assert conversions(output) == expected
     assert not drafts(output)
+
+
+def conversions(folder: Path) -> dict[str, bytes]:
+    """All that was written but the report, which names what was left out of a run, too."""
+    return {name: data for name, data in contents(folder).items() if name not in REPORT}
 
 
 def drafts(folder: Path) -> set[Path]:
@@ -175,7 +180,7 @@ def test_many_small_maps_with_a_worker_killed(team, tmp_path):
     again = convert_library(many, output, QUICK, scheduler=team.address)
     assert again.known == 200
     assert convert_library(many, tmp_path / "local", some("17"), workers=2).is_well
-    of_this_machine = contents(tmp_path / "local")
+    of_this_machine = conversions(tmp_path / "local")
     assert len(of_this_machine) == 4
     assert of_this_machine.items() <= contents(output).items()
 
@@ -204,7 +209,7 @@ def test_map_over_which_workers_die(team, tmp_path, maps, local):
     (row,) = run.ended().failed
     assert row.sentence.startswith("3 workers have died over it, tcp://127.0.0.1:")
     assert not drafts(output)
-    assert not contents(output)
+    assert not conversions(output)
     team.worker()
     assert convert_library(maps, output, some("07"), scheduler=team.address).is_well
     check(output, local, "07")
@@ -289,18 +294,18 @@ def test_workers_that_do_not_share_the_folders(team, tmp_path, monkeypatch):
         assert run.ended().is_well
         assert any(sentence in notice for notice in run.notices) == (name in ("nothing", "other"))
         assert not drafts(folders["out"])
-        assert contents(folders["out"]) == contents(places["nothing"][0]["out"])
+        assert conversions(folders["out"]) == conversions(places["nothing"][0]["out"])
 
 
 def test_workers_with_another_sunsplit(team, tmp_path, maps, local):
     output = tmp_path / "out"
-    empty = tmp_path / "empty" / "sunsplit"
-    empty.mkdir(parents=True)
-    (empty / "__init__.py").touch()
+    none = tmp_path / "none"
+    none.mkdir()
+    (none / "sunsplit.py").touch()  # no package, and so nothing in it
     team.worker(PYTHONPATH=str(other_version(tmp_path / "other", "0.0.9")))
     with pytest.raises(ClusterFailed, match=r"has Sunsplit 0\.0\.9, and .* was asked for: install"):
         convert_library(maps, output, QUICK, scheduler=team.address)
-    team.worker(PYTHONPATH=str(empty.parent))
+    team.worker(PYTHONPATH=str(none))
     with pytest.raises(ClusterFailed, match=r"\(1 more cannot either\)\.$"):
         convert_library(maps, output, QUICK, scheduler=team.address)
     team.worker()
