@@ -66,10 +66,9 @@ class Worker:
         self._send(job)
 
     def memory(self) -> int:
-        """Bytes that it holds now, with its children; 0 once it has ended."""
+        """Bytes that it holds now; 0 once it has ended."""
         try:
-            family = [self._seen, *self._seen.children(recursive=True)]
-            return sum(process.memory_info().rss for process in family)
+            return self._seen.memory_info().rss
         except psutil.Error:
             return 0
 
