@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import bpy
@@ -53,7 +54,10 @@ def complete_sky(
     suns = suns_of(sky)
     if before is not None and before == state.converted_world:
         before = state.original_world
+    replaces = state.is_converted
     restore_scene(scene)
+    if replaces:
+        _name_as_before([sky, suns, *suns.objects, *(one.data for one in suns.objects)])
     if before is None:
         before = unconverted(sky.copy())
         before.name = f"{sky.name} (HDRI)"
@@ -65,6 +69,14 @@ def complete_sky(
             asset.asset_clear()  # it is one of the library, not of this file
     if sky.library is None and "EEVEE" in scene.render.engine:
         eevee.apply(scene, [entry.lamp for entry in state.lamps])
+
+
+def _name_as_before(things: Sequence[bpy.types.ID | None]) -> None:
+    """Without the numbers that they got while the sky that they replace had their names."""
+    for thing in things:
+        name = re.fullmatch(r"(.+)\.\d{3}", thing.name) if thing and not thing.library else None
+        if name:
+            thing.name = name[1]
 
 
 def _is_complete(scene: bpy.types.Scene, sky: bpy.types.World) -> bool:

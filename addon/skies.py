@@ -41,6 +41,8 @@ def unregister() -> None:
 @persistent
 def _imported(context: bpy.types.BlendImportContext, *_: object) -> None:
     """Blender calls this for whatever was appended or linked, before it is used."""
+    if bpy.app.background:
+        return  # nothing is dragged, and no timer would run: 4.5 then hangs when it ends
     worlds = [item.id for item in context.import_items if item.id_type == "WORLD"]
     skies = [world for world in worlds if suns_of(world)]
     scene = bpy.context.scene

@@ -18,7 +18,7 @@ from ...core.errors import UnusableInput
 from ...core.files.written import WrittenConversion
 from .sky import Sky
 
-SAMPLES, WITHOUT_DENOISER = 24, 192
+SAMPLES, WITHOUT_DENOISER = 16, 192
 """Of a pixel; a denoiser makes up for the difference."""
 
 GROUND, SHOWN = 0.4, 0.3

@@ -404,7 +404,8 @@ def test_another_sky_takes_the_place_of_the_first(file):
         used(scene, new)
     assert scene.world == new
     assert len([o for o in scene.objects if o.type == "LIGHT"]) == 4
-    assert sorted(world.name for world in bpy.data.worlds) == sorted([own.name, new.name])
+    assert sorted(world.name for world in bpy.data.worlds) == sorted([own.name, NAME])
+    assert all(not thing.name.endswith(".001") for thing in scene.objects)
     bpy.ops.sunsplit.restore()
     assert scene.world == own
     assert not scene.objects

@@ -315,10 +315,10 @@ def add_library(folder: str) -> None:
         libraries.new(name="Skies", directory=str(FOLDER / folder))
 
 
-def open_assets() -> None:
-    """An Asset Browser in the place of the properties."""
-    area = next(area for area in window().screen.areas if area.type == "PROPERTIES")
-    area.ui_type = "ASSETS"
+def open_assets(on: bool = True) -> None:
+    """An Asset Browser in the place of the properties, or these again."""
+    old, new = ("PROPERTIES", "ASSETS") if on else ("ASSETS", "PROPERTIES")
+    next(area for area in window().screen.areas if area.ui_type == old).ui_type = new
 
 
 def show_assets(method: str) -> None:

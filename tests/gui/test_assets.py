@@ -7,6 +7,7 @@ import json
 import shutil
 import subprocess
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -73,19 +74,21 @@ def asked(opened: Window, jobs: list[dict]) -> list[dict]:
 
 
 @pytest.fixture
-def browser(window: Window, library: Path) -> Window:
+def browser(window: Window, library: Path) -> Iterator[Window]:
     window.ask("open_assets()")
     window.settle()
-    return window
+    yield window
+    window.ask("open_assets(False)")
 
 
 def drag(window: Window, method: str, name: str) -> dict:
     """Drag an asset into the middle of the view; what the scene has then."""
     window.ask(f"show_assets({method!r})")
     start = find(window, name)
+    time.sleep(DOUBLE_CLICK)
     left, top, width, height = window.ask("place('WINDOW')")
     window.carry(start, (left + width // 2, top + height // 2))
-    window.wait_for("is_converted()")
+    window.wait_for("is_converted()", 10)
     return window.ask("sky_state()")
 
 
@@ -101,6 +104,9 @@ def find(window: Window, name: str) -> tuple[int, int]:
                 return left + TILE[0], y
     raise AssertionError(f"The Asset Browser shows no {name}.")
 
+
+DOUBLE_CLICK = 0.5
+"""Seconds after which a second press is a new one."""
 
 METHODS = {"by default": "FOLLOW_PREFS", "append": "APPEND", "link": "LINK"}
 
