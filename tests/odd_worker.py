@@ -30,6 +30,8 @@ def work(job: dict) -> dict:
     if "print" in job:
         print("a library prints")
         os.write(1, b"and another one\n")
+    if "raise" in job:
+        raise RuntimeError(job["raise"])
     return job | {"pid": os.getpid(), "began": time.monotonic()}
 
 

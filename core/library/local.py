@@ -44,11 +44,15 @@ class Done:
 class LocalWorkers:
     """Processes that do tasks. To be closed, which ends them at once.
 
-    memory: bytes that they and this process may hold together.
+    memory: bytes that they and this process may hold together. chatter: they print what is of no
+    interest, see `Worker`.
     """
 
-    def __init__(self, command: Sequence[str], count: int, memory: int) -> None:
+    def __init__(
+        self, command: Sequence[str], count: int, memory: int, chatter: bool = False
+    ) -> None:
         self._command, self._count, self._memory = command, count, memory
+        self._chatter = chatter
         self._events: queue.SimpleQueue[tuple[Worker, Answer | None]] = queue.SimpleQueue()
         self._busy: dict[Worker, Task] = {}
         self._idle: list[Worker] = []
@@ -110,9 +114,12 @@ class LocalWorkers:
             if chosen is None:
                 return
             waiting.remove(chosen)
-            worker = self._idle.pop() if self._idle else Worker(self._command, self._heard)
+            worker = self._idle.pop() if self._idle else self._new_worker()
             self._busy[worker] = chosen
             worker.start(chosen.job)
+
+    def _new_worker(self) -> Worker:
+        return Worker(self._command, self._heard, self._chatter)
 
     def _heard(self, worker: Worker, answer: Answer | None) -> None:
         self._events.put((worker, answer))

@@ -6,11 +6,12 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import psutil
 
@@ -18,6 +19,9 @@ from ..cores import LIMIT
 from ..errors import SunsplitError
 
 Answer = dict[str, Any]
+
+MOST_REPEATED = 4096
+"""Bytes of what a process has said last."""
 
 ONE_CORE = {
     name: "1" for name in (LIMIT, "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -39,20 +43,27 @@ class Worker:
     """A process that does one job at a time. Raises NoWorker.
 
     on_answer: called from a thread with this worker and an answer, or None when the process has
-    ended, however it came to that.
+    ended, however it came to that. chatters: what it prints is no business of the user's, unless
+    it ends by itself with an error.
     """
 
     def __init__(
-        self, command: Sequence[str], on_answer: Callable[[Worker, Answer | None], None]
+        self,
+        command: Sequence[str],
+        on_answer: Callable[[Worker, Answer | None], None],
+        chatters: bool = False,
     ) -> None:
         self._on_answer = on_answer
+        self._chatter = tempfile.TemporaryFile() if chatters else None  # noqa: SIM115, see _listen
         try:
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
+                stderr=self._chatter,
                 env=os.environ | ONE_CORE,
                 encoding="utf-8",
+                errors="replace",
             )
         except OSError as error:
             raise NoWorker(f"No worker can be started: {error.strerror or error}.") from error
@@ -95,8 +106,20 @@ class Worker:
         assert self._process.stdin is not None
         with self._process.stdout as answers:
             for line in answers:
-                self._on_answer(self, json.loads(line))
-        self._process.wait()
+                if line.startswith("{"):  # Blender may speak before any script of ours does
+                    self._on_answer(self, json.loads(line))
+        status = self._process.wait()
         with suppress(BrokenPipeError):  # what it was told and has not read
             self._process.stdin.close()
+        if self._chatter:
+            with self._chatter as said:
+                self._repeat(said, status)
         self._on_answer(self, None)
+
+    def _repeat(self, said: IO[bytes], status: int) -> None:
+        """A traceback is for whoever can mend what it says."""
+        if status > 0 and sys.stderr:
+            size = said.seek(0, os.SEEK_END)
+            said.seek(max(size - MOST_REPEATED, 0))
+            sys.stderr.write(said.read().decode(errors="replace"))
+            sys.stderr.flush()

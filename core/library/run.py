@@ -79,7 +79,7 @@ def convert_library(
         assets = []
         if options.assets:
             made = _converted_maps(planned.maps, rows)
-            kind, pack, makers = options.assets, options.pack, team.of_processes(command)
+            kind, pack, makers = options.assets, options.pack, team.for_assets(command)
             for asset in make_assets(made, output, kind, pack, makers):
                 told.asset(asset)
                 assets.append(asset)

@@ -50,8 +50,8 @@ class Team:
         """Who converts maps. output: folder of all that is written."""
         if self.scheduler is not None:
             return ClusterWorkers(self.scheduler, output.absolute(), self.notice)
-        return self.of_processes(converter())
+        return LocalWorkers(converter(), self.workers, self.memory)
 
-    def of_processes(self, command: Sequence[str]) -> LocalWorkers:
-        """Processes of this machine that have this command."""
-        return LocalWorkers(command, self.workers, self.memory)
+    def for_assets(self, command: Sequence[str]) -> LocalWorkers:
+        """Who makes .blend files: Blenders, of this command."""
+        return LocalWorkers(command, self.workers, self.memory, chatter=True)

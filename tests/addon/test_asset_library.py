@@ -44,6 +44,7 @@ def worker():
     command = [sys.executable, str(WORKER)]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     with subprocess.Popen(command, **pipes, text=True) as process:
+        process.stdin.write("{}\n")  # the greeting
 
         def ask(job):
             process.stdin.write(json.dumps(job) + "\n")

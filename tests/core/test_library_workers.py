@@ -59,6 +59,18 @@ def test_what_libraries_print_is_no_answer(capfd):
     assert "and another one" in complaints
 
 
+def test_what_a_worker_chatters_is_only_told_when_it_fails(capfd):
+    with LocalWorkers(ODD, 1, PLENTY, chatter=True) as pool:
+        assert len([each for each in pool.run([Task({"print": 1}, 0)]) if each]) == 1
+        assert capfd.readouterr() == ("", "")
+        done = [each for each in pool.run([Task({"print": 1, "raise": "a bug"}, 0)]) if each]
+    assert [each.sentence for each in done] == ["The worker died over it (exit status 1)."]
+    said, complaints = capfd.readouterr()
+    assert said == ""
+    assert "a library prints" in complaints
+    assert "RuntimeError: a bug" in complaints
+
+
 def test_a_worker_that_dies_takes_nothing_else_along():
     done = run([{"number": 0}, {"kill": 1}, {"number": 1}, {"number": 2}])
     failed = [each for each in done if each.answer is None]

@@ -64,6 +64,7 @@ def asked(opened: Window, jobs: list[dict]) -> list[dict]:
         env=opened.debian.environment(home),
     ) as process:
         answers = []
+        process.stdin.write("{}\n")  # the greeting
         for job in jobs:
             process.stdin.write(json.dumps(job) + "\n")
             process.stdin.flush()
