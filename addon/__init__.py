@@ -5,7 +5,7 @@ import sys
 
 import bpy
 
-from . import command, operators, overlay, panel, presets, properties, skies
+from . import command, importing, operators, overlay, panel, presets, properties
 
 CLASSES = (
     properties.SunsplitLamp,
@@ -38,7 +38,7 @@ def register() -> None:
     command.register()
     presets.register()
     overlay.register()
-    skies.register()
+    importing.register()
     # Blender unregisters its add-ons when it ends. As a Python module it does not, and 4.5 then
     # hangs or crashes over any operator or panel that is left.
     if not bpy.app.binary_path:
@@ -49,7 +49,7 @@ def unregister() -> None:
     atexit.unregister(unregister)
     if not hasattr(bpy.types.Scene, "sunsplit"):
         return  # Blender disables an extension when it ends, after what `register` has asked for.
-    skies.unregister()
+    importing.unregister()
     overlay.unregister()
     presets.unregister()
     command.unregister()
