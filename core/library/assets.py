@@ -85,6 +85,7 @@ def make_assets(
     kind: a file for "each" map, beside its conversion, or "one" in the output's folder, of its
     name. makers: processes of `blender_command`. Raises CannotWrite.
     """
+    output = output.absolute()  # as the jobs have it
     catalogues = {asset["catalogue"] for asset in (each.asset(pack) for each in maps)}
     write_catalogues(output, sorted(filter(None, catalogues)))
     files = [_File.of([each], output, pack) for each in maps]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 import threading
 from collections.abc import Iterator
@@ -52,7 +53,7 @@ def _planned_line(each: Planned) -> str:
         output.stem if output.folder == "." else f"{output.folder}/{output.stem}"
         for output in each.map.outputs
     )
-    return f"{file.path}, {size}{more}: {'done' if each.row else 'to do'}: {names}"
+    return _line(f"{file.path}, {size}{more}: {'done' if each.row else 'to do'}: {names}")
 
 
 @contextmanager
@@ -87,17 +88,22 @@ def _tell_by_line(event: Event) -> None:
 def _failure(event: Event) -> str:
     """The line for what went wrong; "" where nothing did."""
     if isinstance(event, AssetSettled):
-        return f"sunsplit: {event.blend}: {event.sentence}" if event.sentence else ""
+        return _line(f"sunsplit: {event.blend}: {event.sentence}") if event.sentence else ""
     row = event.row
-    return f"sunsplit: {row.source}: {row.sentence}" if row.status == "failed" else ""
+    return _line(f"sunsplit: {row.source}: {row.sentence}") if row.status == "failed" else ""
 
 
 def _done(event: Event) -> str:
     if isinstance(event, AssetSettled):
-        return event.blend
+        return _line(event.blend)
     row = event.row
     suns = "1 sun" if row.lights == 1 else f"{row.lights} suns"
-    return f"{row.source}: {suns} with {row.share:.1%} of all light, {row.seconds:.1f} s"
+    return _line(f"{row.source}: {suns} with {row.share:.1%} of all light, {row.seconds:.1f} s")
+
+
+def _line(text: str) -> str:
+    """A file's name may hold line feeds and what moves a terminal's cursor."""
+    return re.sub(r"[\x00-\x1f\x7f-\x9f]", "?", text)
 
 
 def say_notice(sentence: str) -> None:

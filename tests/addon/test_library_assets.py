@@ -68,8 +68,9 @@ def test_each_map_becomes_a_file_beside_its_conversion_and_is_not_made_again(lib
     assert (out / "plain.blend").is_file()
 
 
-def test_one_file_for_all_holds_the_assets_of_all(library, out):
-    result = run(library, out, assets="one", pack=True)
+def test_one_file_for_all_holds_the_assets_of_all(library, out, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = run("library", "out", assets="one", pack=True)
     assert result.is_well
     assert [one.blend for one in result.assets] == ["out.blend"]
     worlds, collections = assets_in(out / "out.blend")

@@ -4,6 +4,7 @@ import json
 import os
 import pty
 import select
+import shutil
 import signal
 import subprocess
 import termios
@@ -71,6 +72,21 @@ def test_a_failure_is_a_line_on_stderr_and_the_exit_status(library, out, capfd):
         "sunsplit: bad.hdr: bad.hdr is truncated or damaged: its Radiance header has no size.\n"
     )
     assert f"{COUNT + 1} maps: {COUNT} converted, 1 failed" in said
+
+
+def test_names_of_any_kind_are_lines(library, out, capfd):
+    shutil.copy(library / "map 0000.hdr", library / "two\nlines.hdr")
+    shutil.copy(library / "map 0000.hdr", os.fsencode(library) + b"/no\xfftext.hdr")
+    assert run(library, "-o", out, "--preview") == 1
+    said, complaints = capfd.readouterr()
+    assert "two?lines.hdr: 10 suns with" in said
+    assert complaints == (
+        "sunsplit: no\\udcfftext.hdr: no\\udcfftext.hdr has a name that is not Unicode: rename it."
+        "\n"
+    )
+    assert "no\\udcfftext" in (out / "report.html").read_text()
+    assert run(library, "-o", out, "--preview", "--json") == 1
+    assert len(lines(capfd)) == COUNT + 3
 
 
 def test_json_lines_for_machines(library, out, capfd):
