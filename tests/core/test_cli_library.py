@@ -74,19 +74,20 @@ def test_a_failure_is_a_line_on_stderr_and_the_exit_status(library, out, capfd):
     assert f"{COUNT + 1} maps: {COUNT} converted, 1 failed" in said
 
 
-def test_names_of_any_kind_are_lines(library, out, capfd):
+def test_names_of_any_kind_are_lines(library, out):
+    """In a process of its own: pytest's cannot hand on what is no text."""
     shutil.copy(library / "map 0000.hdr", library / "two\nlines.hdr")
     shutil.copy(library / "map 0000.hdr", os.fsencode(library) + b"/no\xfftext.hdr")
-    assert run(library, "-o", out, "--preview") == 1
-    said, complaints = capfd.readouterr()
-    assert "two?lines.hdr: 10 suns with" in said
-    assert complaints == (
+    done = sunsplit("library", library, "-o", out, "--preview", "--workers", "1")
+    assert done.returncode == 1
+    assert "two?lines.hdr: 10 suns with" in done.stdout
+    assert done.stderr == (
         "sunsplit: no\\udcfftext.hdr: no\\udcfftext.hdr has a name that is not Unicode: rename it."
         "\n"
     )
     assert "no\\udcfftext" in (out / "report.html").read_text()
-    assert run(library, "-o", out, "--preview", "--json") == 1
-    assert len(lines(capfd)) == COUNT + 3
+    done = sunsplit("library", library, "-o", out, "--preview", "--workers", "1", "--json")
+    assert len(done.stdout.splitlines()) == COUNT + 3
 
 
 def test_json_lines_for_machines(library, out, capfd):
