@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sunsplit.core import environment as environments
-from sunsplit.core import reduction, sphere
+from sunsplit.core import cores, reduction, sphere
 from sunsplit.core.conversion import convert
 from sunsplit.core.environment import (
     LUMINANCE_WEIGHTS,
@@ -96,8 +96,8 @@ def test_sums_do_not_depend_on_how_many_cores_there_are(monkeypatch):
     pixels = Raw(noise(96))
     monkeypatch.setattr(reduction, "PIXELS", 1)
     expected = reduced(pixels, 24)
-    for cores in (1, 7):
-        monkeypatch.setattr(reduction.os, "cpu_count", lambda cores=cores: cores)
+    for number in (1, 7):
+        monkeypatch.setenv(cores.LIMIT, str(number))
         found = reduced(pixels, 24)
         assert (found.radiance == expected.radiance).all()
         assert (found.direction == expected.direction).all()

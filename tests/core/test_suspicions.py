@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sunsplit.core import environment as environments
-from sunsplit.core import reduction, sphere
+from sunsplit.core import cores, reduction, sphere
 from sunsplit.core.brightest import MOST, brightest_of_map
 from sunsplit.core.cli import main
 from sunsplit.core.conversion import convert
@@ -192,8 +192,8 @@ def test_the_brightest_numbers_do_not_depend_on_how_many_cores_there_are(monkeyp
     pixels = clipped_at(0.5, outdoors(2048, radius=0.5))
     monkeypatch.setattr(reduction, "PIXELS", 1 << 16)
     expected = environment(pixels)
-    for cores in (1, 7):
-        monkeypatch.setattr(reduction.os, "cpu_count", lambda cores=cores: cores)
+    for number in (1, 7):
+        monkeypatch.setenv(cores.LIMIT, str(number))
         found = environment(pixels)
         assert map_warnings(found) == map_warnings(expected)
         assert (found.reduction.brightest.pixels == expected.reduction.brightest.pixels).all()
