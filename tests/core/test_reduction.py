@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sunsplit.core import environment as environments
 from sunsplit.core import cores, reduction, sphere
+from sunsplit.core import environment as environments
 from sunsplit.core.conversion import convert
 from sunsplit.core.environment import (
     LUMINANCE_WEIGHTS,

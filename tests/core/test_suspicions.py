@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sunsplit.core import environment as environments
 from sunsplit.core import cores, reduction, sphere
+from sunsplit.core import environment as environments
 from sunsplit.core.brightest import MOST, brightest_of_map
 from sunsplit.core.cli import main
 from sunsplit.core.conversion import convert
