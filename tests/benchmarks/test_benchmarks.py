@@ -17,6 +17,7 @@ from tests.benchmarks import (
     eevee,
     eevee_report,
     equal_error,
+    library,
     library_cluster,
     library_report,
     light_tree,
@@ -236,6 +237,18 @@ def test_library_report(tmp_path, sunrise):
     assert min(results[0].busy) < results[0].bar
     lines = (tmp_path / "library_report.md").read_text().splitlines()
     assert sum(line.startswith("| ") for line in lines) == 2 + len(results)
+
+
+def test_library(tmp_path, sunrise):
+    found = library.main([str(sunrise), "--few", "-o", str(tmp_path)])
+    assert list(found) == list(library.PARTS)
+    assert found["kills"].numbers["same"] == found["kills"].numbers["runs"] == 2
+    (limit,) = found["memory"].numbers.values()
+    assert limit["of the limit"] <= 1
+    assert limit["failed"] == 0
+    assert found["many"].numbers["second"]["known"] == 10
+    lines = (tmp_path / "library.md").read_text().splitlines()
+    assert sum(line.startswith("## ") for line in lines) == len(found)
 
 
 def test_library_cluster(tmp_path):
