@@ -18,8 +18,9 @@ from pathlib import Path
 
 import psutil
 
+from sunsplit.core.library.events import Settled
 from sunsplit.core.library.options import LibraryOptions
-from sunsplit.core.library.run import Settled, convert_library
+from sunsplit.core.library.run import convert_library
 from sunsplit.core.settings import ConversionSettings
 from tests.dask_cluster import Cluster, Process
 from tests.libraries import contents, write_maps
