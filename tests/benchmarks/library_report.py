@@ -12,6 +12,8 @@ from __future__ import annotations
 import argparse
 import base64
 import io
+import json
+import shutil
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -24,13 +26,12 @@ import numpy as np
 from PIL import Image
 from playwright.sync_api import Browser, CDPSession, Page
 
-from sunsplit.core.conversion import convert
-from sunsplit.core.errors import UnusableInput
-from sunsplit.core.files.conversion import save
+from sunsplit.core import LibraryOptions, convert_library
 from sunsplit.core.files.maps import load
 from sunsplit.core.library.records import Row
-from sunsplit.core.library.report import write_report
-from sunsplit.core.library.thumbnail import JPEG, thumbnail
+from sunsplit.core.library.report import HTML, write_report
+from sunsplit.core.library.side_files import OF_FOLDER
+from sunsplit.core.library.thumbnail import JPEG
 from tests.browser import browser
 from tests.files import write_exr
 
@@ -68,42 +69,20 @@ def studio_lights() -> list[Path]:
     )
 
 
-def row_of(path: Path, folder: Path) -> Row:
-    """A map, converted into a folder."""
-    start = time.perf_counter()
-    source = f"{path.parent.name}/{path.name}"
-    try:
-        environment = load(path)
-        conversion = convert(environment)
-    except UnusableInput as error:
-        return Row(source, "failed", str(error), seconds=time.perf_counter() - start)
-    files = save(conversion, folder / path.parent.name, preview=True)
-    return Row(
-        source=source,
-        status="done",
-        width=environment.own_width,
-        height=environment.own_height,
-        lights=len(conversion.suns),
-        share=conversion.account.share,
-        predicted_error=conversion.predicted_error,
-        ground_error=conversion.ground_error,
-        account_error=float(conversion.account.relative_error.max()),
-        seconds=time.perf_counter() - start,
-        warnings=environment.warnings,
-        files=tuple(
-            written.relative_to(folder).as_posix()
-            for written in (files.preview, files.residual, files.lights)
-            if written
-        ),
-        thumbnail=base64.b64encode(thumbnail(conversion)).decode(),
-    )
+def converted(maps: Sequence[Path], folder: Path, *, with_a_failure: bool) -> tuple[Row, ...]:
+    """Maps as a library, converted; its rows. Its output, with its report, is the folder `out`.
 
-
-def cropped(folder: Path) -> Path:
-    """The sunrise without its lowest rows, which cannot be converted."""
-    (folder / "unfinished").mkdir()
-    pixels = load(SUNRISE).radiance[:-24]
-    return write_exr(folder / "unfinished" / "sunrise_cropped.exr", pixels)
+    with_a_failure: the sunrise without its lowest rows is in it, which cannot be converted."""
+    library = folder / "World maps"
+    for path in maps:
+        (library / path.parent.name).mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, library / path.parent.name)
+    if with_a_failure:
+        (library / "unfinished").mkdir()
+        pixels = load(SUNRISE).radiance[:-24]
+        write_exr(library / "unfinished" / "sunrise_cropped.exr", pixels)
+    (library / OF_FOLDER).write_text(json.dumps(ABOUT), encoding="utf-8")
+    return convert_library(library, folder / "out", LibraryOptions(preview=True)).rows
 
 
 def many(rows: Sequence[Row], count: int) -> list[Row]:
@@ -239,15 +218,13 @@ def main(arguments: Sequence[str] | None = None) -> list[Result]:
     maps = chosen.maps or [SUNRISE, *studio_lights()]
     with tempfile.TemporaryDirectory() as name, browser() as opened:
         folder = Path(name)
-        rows = [row_of(path, folder) for path in maps]
+        rows = converted(maps, folder, with_a_failure=chosen.picture is not None)
         if chosen.picture:
-            rows.insert(3, row_of(cropped(folder), folder))
-            rows = [replace(row, **ABOUT) for row in rows]
-            report, _ = write_report(folder, rows, "World maps")
+            report = folder / "out" / HTML
             take_picture(opened, report, chosen.picture, chosen.width, chosen.dark)
             return []
         rows = many(rows, chosen.rows)
-        report, _ = write_report(folder, rows, f"{chosen.rows:,} maps")
+        report, _ = write_report(folder / "many", rows, f"{chosen.rows:,} maps")
         results = measure(opened, report, chosen.opens)
         text = table(results, len(rows), report.stat().st_size / 1e6, opened.version)
     chosen.output.mkdir(parents=True, exist_ok=True)
