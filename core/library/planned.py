@@ -74,7 +74,7 @@ def plan_library(
     maps = []
     for each in plan(found, options):
         job = _job(library, output, each, options)
-        facts = facts_beside(library / each.file.path, library)
+        facts = facts_beside(library / each.file.path, library, each.file.width)
         maps.append(Planned(each, job, facts, _row_of_earlier(job, each)))
     return LibraryPlan(tuple(maps), found.unread)
 

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from .sizes import name_without_size
+
 OF_FOLDER = "library.json"
 
 LARGEST = 2**20
 """Bytes of a side file: more is something else."""
-
-_SIZE = re.compile(r"[ ._-]\d{1,3}k$", re.IGNORECASE)
 
 _KEYS = {
     "author": ("author", "authors"),
@@ -49,19 +49,24 @@ class SideFacts:
     warnings: tuple[str, ...] = ()
 
 
-def facts_beside(file: Path, root: Path) -> SideFacts:
-    """What is said of a map. root: the library's folder, the last one that is looked into."""
+def facts_beside(file: Path, root: Path, width: int) -> SideFacts:
+    """What is said of a map. root: the library's folder, the last one that is looked into. width:
+    of the map in pixels, which its name may have and its side file's not; 0: unknown."""
     found: dict[str, Any] = {}
     warnings: list[str] = []
-    for side in _side_files(file, root):
+    for side in _side_files(file, root, width):
         document = _read(side, root, warnings)
         for name, value in _facts(document, _shown(side, root), warnings).items():
             found.setdefault(name, value)
     return SideFacts(**found, warnings=tuple(warnings))
 
 
-def _side_files(file: Path, root: Path) -> Iterator[Path]:
-    names = [f"{file.name}.json", f"{file.stem}.json", f"{_SIZE.sub('', file.stem)}.json"]
+def _side_files(file: Path, root: Path, width: int) -> Iterator[Path]:
+    names = [
+        f"{file.name}.json",
+        f"{file.stem}.json",
+        f"{name_without_size(file.stem, width)}.json",
+    ]
     for name in dict.fromkeys(names):
         if name != OF_FOLDER:
             yield file.with_name(name)

@@ -105,7 +105,7 @@ def test_jobs_that_do_not_fit_together_are_done_one_after_the_other():
 
 
 def test_small_jobs_are_done_beside_a_large_one():
-    large, small = Task({"sleep": 1.0, "number": 0}, 1000 * MEGABYTE), 100 * MEGABYTE
+    large, small = Task({"sleep": 3.0, "number": 0}, 1000 * MEGABYTE), 100 * MEGABYTE
     tasks = [large, Task({"number": 1}, 1000 * MEGABYTE), Task({"number": 2}, small)]
     with LocalWorkers(ODD, 2, own_memory() + 1500 * MEGABYTE) as pool:
         done = [each.answer["number"] for each in pool.run(tasks) if each]
