@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from .conversion import Conversion, convert
     from .environment import EnvironmentMap
     from .errors import SunsplitError
+    from .export.mitsuba import mitsuba_dict
+    from .export.run import export
+    from .export.settings import ExportSettings
+    from .export.skylight import read_skylight, skylight_of
     from .files.conversion import account_of_files, save
     from .files.maps import load
     from .files.samples_json import read_samples
@@ -26,32 +30,42 @@ _HOMES = {
     "Conversion": "conversion",
     "ConversionSettings": "settings",
     "EnvironmentMap": "environment",
+    "ExportSettings": "export.settings",
     "LibraryOptions": "library.options",
     "LibraryResult": "library.run",
     "SunsplitError": "errors",
     "account_of_files": "files.conversion",
     "convert": "conversion",
     "convert_library": "library.run",
+    "export": "export.run",
     "load": "files.maps",
     "map_warnings": "suspicions",
+    "mitsuba_dict": "export.mitsuba",
     "read_samples": "files.samples_json",
+    "read_skylight": "export.skylight",
     "save": "files.conversion",
+    "skylight_of": "export.skylight",
 }
 
 __all__ = [
     "Conversion",
     "ConversionSettings",
     "EnvironmentMap",
+    "ExportSettings",
     "LibraryOptions",
     "LibraryResult",
     "SunsplitError",
     "account_of_files",
     "convert",
     "convert_library",
+    "export",
     "load",
     "map_warnings",
+    "mitsuba_dict",
     "read_samples",
+    "read_skylight",
     "save",
+    "skylight_of",
 ]
 
 

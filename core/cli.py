@@ -1,4 +1,5 @@
-"""The command line: `sunsplit convert`, `info`, `figures` and `library`. Needs no Blender.
+"""The command line: `sunsplit convert`, `info`, `figures`, `export` and `library`. Needs no
+Blender.
 
 Exit status: 0 done, 1 the input cannot be used or the output not written, 2 wrong usage,
 130 cancelled.
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from . import interrupts
+from .cli_export import add_export
 from .cli_library import add_library
 from .cli_settings import (
     add_figure_settings,
@@ -137,6 +139,14 @@ def _parser() -> argparse.ArgumentParser:
     add_figure_settings(figures)
     figures.add_argument("--json", action="store_true", help="print the result as JSON")
     figures.set_defaults(run=run_figures)
+    add_export(
+        verbs.add_parser(
+            "export",
+            help="write a conversion for another renderer",
+            description="Write the suns and the map of a conversion as files of another renderer, "
+            "to include in a scene, and a small scene that renders at once.",
+        )
+    )
     add_library(
         verbs.add_parser(
             "library",

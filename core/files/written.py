@@ -10,17 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..account import Account
+from ..environment import WIDE, whole_part
 from ..errors import UnusableInput
+from ..reduction import narrowed
 from ..suns import Sun
-from . import lights_json
+from . import exr, lights_json
 from .belonging import read_named, read_together
-from .maps import load
 
 
 @dataclass(frozen=True, eq=False)
 class WrittenConversion:
     """source_sha256: of the map's file. suns: brightest first. residual: its file, or None.
-    radiance: of the residual, float32 (height, width, 3), narrower where it is very wide.
+    radiance: of the residual, float32 (height, width, 3), narrowed where it is wider than asked.
     has_cells: the residual is a Voronoi map. predicted_error, ground_error: parts, as
     `Conversion` has them."""
 
@@ -34,21 +35,24 @@ class WrittenConversion:
     ground_error: float
 
 
-def read_written(lights: str | Path) -> WrittenConversion:
+def read_written(lights: str | Path, widest: int = WIDE) -> WrittenConversion:
     """The conversion that a `<name>.lights.json` and the files beside it hold.
 
-    Raises UnusableInput, also when the residual is missing or of another conversion.
+    widest: pixels of the residual's width that are wanted at most. Raises UnusableInput, also when
+    the residual is missing or of another conversion.
     """
     lights = Path(lights)
-    return read_together(lights, lambda: _read(lights))
+    return read_together(lights, lambda: _read(lights, widest))
 
 
-def _read(lights: Path) -> WrittenConversion:
+def _read(lights: Path, widest: int) -> WrittenConversion:
     document, suns, account = lights_json.read(lights)
     residual, radiance = None, None
     if stored := document["residual"]:
         residual, stated = lights_json.named_file(lights, stored)
-        radiance = read_named(residual, stated, lights.name, lambda path: load(path).radiance)
+        radiance = read_named(
+            residual, stated, lights.name, lambda path: _radiance_of(path, widest)
+        )
     try:
         return WrittenConversion(
             str(document["source"]["sha256"]),
@@ -61,6 +65,17 @@ def _read(lights: Path) -> WrittenConversion:
         )
     except lights_json.DAMAGE as error:
         raise UnusableInput(f"{lights.name} is damaged: {error!r} in what it states.") from error
+
+
+def _radiance_of(residual: Path, widest: int) -> NDArray[np.float32]:
+    """Of a residual map, which needs no repair and may be black. Raises UnusableInput."""
+    pixels, _ = exr.read(residual)
+    if pixels.width != 2 * pixels.height:
+        raise UnusableInput(f"{residual.name} is damaged: a residual map is twice as wide as high.")
+    radiance = narrowed(pixels, whole_part(pixels.width, widest))
+    if not (np.isfinite(radiance).all() and (radiance >= 0).all()):
+        raise UnusableInput(f"{residual.name} is damaged: it holds what is no light.")
+    return radiance
 
 
 def _errors(stated: dict[str, Any]) -> tuple[float, float]:
