@@ -80,10 +80,15 @@ Narrow = Literal["discs", "many rays", "one ray"]
 """What a format makes of suns that are not painted: each as it is, many rays each, or one each."""
 
 
-def emitters_of(sky: Skylight, narrow: Narrow, discs: Discs, widest: float = WIDE_SUN) -> Emitters:
-    """Share the suns out. widest: angular diameter, radians, from which `discs` = "auto" paints."""
+def emitters_of(
+    sky: Skylight, narrow: Narrow, discs: Discs, widest: float | None = None
+) -> Emitters:
+    """Share the suns out. widest: angular diameter, radians, from which `discs` = "auto" paints; by
+    default no native disc, and WIDE_SUN of rays."""
+    if widest is None:
+        widest = np.inf if narrow == "discs" else WIDE_SUN
     if discs == "auto":
-        kept = [sun for sun in sky.suns if sun.angular_diameter < widest or narrow == "discs"]
+        kept = [sun for sun in sky.suns if sun.angular_diameter < widest]
     else:
         kept = [sun for sun in sky.suns if discs == "lights" or not sun.angular_diameter]
     painted = [sun for sun in sky.suns if sun not in kept]
