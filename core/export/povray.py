@@ -42,8 +42,8 @@ RADIOSITY = """\
 #if (Sunsplit_Radiosity)
   global_settings {
     radiosity {
-      count 400, 100000
-      error_bound 0.3
+      count 600, 100000
+      error_bound 0.2
       nearest_count 5
       recursion_limit 4
       adc_bailout 1e-5
@@ -120,7 +120,7 @@ def _comments(lines: list[str]) -> list[str]:
 def _command(camera: Camera, names: Names) -> str:
     picture = names.scene.removesuffix(".pov") + ".exr"
     return (
-        f"povray +I{names.scene} +W{camera.width} +H{camera.height} +A0.1 +FE +O{picture}, "
+        f"povray +I{names.scene} +W{camera.width} +H{camera.height} +A0.1 +R3 -J +FE +O{picture}, "
         "in this folder."
     )
 
