@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sunsplit.core import mitsuba_dict, read_skylight
+from sunsplit.core import ExportSettings, export_conversion, mitsuba_dict, read_skylight
 from sunsplit.core.export.axes import Y_UP, Z_UP
 from tests.exporting import MEAN, converted, exported, reference, shadows_agree
 from tests.mitsuba_renders import picture, plate, renderer
@@ -79,11 +79,9 @@ def test_turned_light(tmp_path, sunrise, lights, mitsuba):
     """A sky that is turned about no axis in particular: suns and map turn together."""
     from scipy.spatial.transform import Rotation
 
-    from sunsplit.core import ExportSettings, export
-
     turn = Rotation.from_euler("xyz", (20, -35, 110), degrees=True).as_matrix()
     sky = read_skylight(lights)
-    export(sky.turned(turn), tmp_path, ExportSettings("mitsuba"))
+    export_conversion(sky.turned(turn), tmp_path, ExportSettings("mitsuba"))
     for normal in (unit((0, 0, 1)), unit((1, 1, 1))):
         found = plate(tmp_path / f"{sky.name}.lights.xml", normal, Y_UP.of, 400, 1)
         expected = ALBEDO / np.pi * irradiance(sunrise, turn.T @ normal)
