@@ -13,8 +13,9 @@ from .. import sphere
 from ..suns import Sun
 from ..tolerances import HALF_MAXIMUM
 from .axes import Y_UP_LEFT, Axes, chosen_axes
-from .emitters import Emitters, emitters_of
-from .made import Made, Names, heading, number
+from .emitters import Emitters, emitters_of, rays_of_disc
+from .made import Made, heading, number
+from .names import Names, names_of
 from .settings import ExportSettings
 from .skylight import Floats, Skylight
 from .stage import STAGE, Ball, Box, Camera, Stage, Thing
@@ -66,10 +67,13 @@ Radiosity lets the map light surfaces, and is set here; with a radiosity of your
   #declare Sunsplit_Radiosity = false;
 The scene is taken to lie around the origin, within some thousand units."""
 
-RADIOSITY_LOSS = (
-    "the map lights surfaces by radiosity, which is interpolated: small shadows of it are blurred."
-)
-GRID_LOSS = f"area lights of {GRID} x {GRID} stand for suns with a width, and mirrors show no suns."
+LOSSES = {
+    "grid": f"Suns with a width are area lights of {GRID} x {GRID}: shadows fade in so many steps, "
+    "and mirrors do not show them.",
+    "rays": "Suns too wide for an area light are parallel lights, 61 each: shadows fade in so many "
+    "steps.",
+    "radiosity": "The map lights surfaces by radiosity, which blurs its small shadows.",
+}
 
 
 def made_for_povray(sky: Skylight, settings: ExportSettings) -> Made:
@@ -78,7 +82,7 @@ def made_for_povray(sky: Skylight, settings: ExportSettings) -> Made:
     emitters = emitters_of(sky, "discs", settings.discs, WIDE_DISC)
     stem = plain_name(sky.name)
     losses = tuple(_losses(emitters, stem))
-    names = Names(f"{stem}.lights.inc", f"{stem}.scene.pov", f"{stem}.povray.exr")
+    names = names_of("povray", stem)
     radiance, scale = emitters.radiance, 1.0
     if radiance is not None:
         radiance, scale = _within_half(radiance)
@@ -103,13 +107,15 @@ def plain_name(name: str) -> str:
 
 
 def _losses(emitters: Emitters, stem: str) -> list[str]:
-    losses = emitters.losses
-    if any(sun.angular_diameter for sun in emitters.discs):
-        losses.append(GRID_LOSS)
-    if emitters.radiance is not None:
-        losses.append(RADIOSITY_LOSS)
+    widths = [sun.angular_diameter for sun in emitters.discs if sun.angular_diameter]
+    found = {
+        "grid": any(width < WIDE_DISC for width in widths),
+        "rays": any(width >= WIDE_DISC for width in widths),
+        "radiosity": emitters.radiance is not None,
+    }
+    losses = emitters.losses + [LOSSES[kind] for kind, lost in found.items() if lost]
     if stem != emitters.name:
-        losses.append(f"POV-Ray reads no such name: the files are called {stem}.")
+        losses.append(f"POV-Ray cannot read a file of this name: the files are called {stem}.")
     return losses
 
 
@@ -137,20 +143,27 @@ def _within_half(radiance: NDArray[np.float32]) -> tuple[NDArray[np.float32], fl
 
 
 def _sun(sun: Sun, axes: Axes) -> list[str]:
-    """A light of colour 1 that a white surface faces makes it shine with 1: with a radiance that
-    belongs to an irradiance of pi."""
-    place = _vector(FAR * axes.of(sun.to_light))
+    """A light of colour 1 makes a white surface that faces it shine with 1: with the radiance that
+    an irradiance of pi gives."""
     if not sun.angular_diameter:
-        colour = _vector(sun.irradiance / np.pi)
-        return [f"light_source {{ {place} rgb {colour} parallel point_at 0 }}"]
+        return [_parallel(axes.of(sun.to_light), sun.irradiance)]
+    if sun.angular_diameter >= WIDE_DISC:
+        rays = axes.of(rays_of_disc(sun.to_light, sun.angular_diameter / 2))
+        return [_parallel(to_light, sun.scalar_irradiance / len(rays)) for to_light in rays]
     size = 2 * FAR * np.tan(sun.angular_diameter / 2)
     across, along = (_vector(size * axes.of(side)) for side in sphere.tangents(sun.to_light))
-    # Each light of the grid gives its part on a surface that faces it, not the sun's middle.
+    place = _vector(FAR * axes.of(sun.to_light))
+    # Each light of the grid gives its part to a surface that faces it, not the sun's middle.
     return [
         f"light_source {{ {place} rgb {_vector(sun.scalar_irradiance / np.pi)}",
         f"  area_light {across}, {along}, {GRID}, {GRID} circular adaptive 2 area_illumination",
         "}",
     ]
+
+
+def _parallel(to_light: Floats, irradiance: Floats) -> str:
+    place, colour = _vector(FAR * to_light), _vector(irradiance / np.pi)
+    return f"light_source {{ {place} rgb {colour} parallel point_at 0 }}"
 
 
 def _sky(emitters: Emitters, scale: float, axes: Axes, map_name: str) -> list[str]:
