@@ -28,7 +28,8 @@ class Made:
 
 def heading(emitters: Emitters, axes: Axes, losses: tuple[str, ...]) -> list[str]:
     """What every file says of itself, in lines without the signs of a comment."""
-    name = emitters.name.encode("ascii", "backslashreplace").decode().replace("--", "- -")
+    # A line break in it would end the comment that it stands in.
+    name = emitters.name.encode("unicode_escape").decode().replace("--", "- -")
     return [
         f'The light of "{name}", by Sunsplit {version()}.',
         f"Axes: {axes.name}. Units: metres; radiance as in the HDRI, linear Rec.709.",
