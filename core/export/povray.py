@@ -73,6 +73,8 @@ LOSSES = {
     "rays": "Suns too wide for an area light are parallel lights, 61 each: shadows fade in so many "
     "steps.",
     "radiosity": "The map lights surfaces by radiosity, which blurs its small shadows.",
+    "missed": "Radiosity finds narrow suns in the map by luck only: their light will be blotchy or "
+    "missing; as lights they are right.",
 }
 
 
@@ -81,7 +83,7 @@ def made_for_povray(sky: Skylight, settings: ExportSettings) -> Made:
     axes = chosen_axes(settings.up, Y_UP_LEFT, Y_UP_LEFT)
     emitters = emitters_of(sky, "discs", settings.discs, WIDE_DISC)
     stem = plain_name(sky.name)
-    losses = tuple(_losses(emitters, stem))
+    losses = tuple(_losses(sky, emitters, stem))
     names = names_of("povray", stem)
     radiance, scale = emitters.radiance, 1.0
     if radiance is not None:
@@ -100,18 +102,20 @@ def made_for_povray(sky: Skylight, settings: ExportSettings) -> Made:
 def plain_name(name: str) -> str:
     """As POV-Ray takes names of files: without letters beyond ASCII, spaces, quotes and slashes.
     What is replaced is told apart by some digits at the end."""
-    plain = re.sub(r"[^A-Za-z0-9._+,=@^~-]", "_", name)
+    plain = re.sub(r"[^A-Za-z0-9._+,-]", "_", name)
     if plain == name:
         return name
     return f"{plain}-{sha256(name.encode('utf-8', 'surrogatepass')).hexdigest()[:6]}"
 
 
-def _losses(emitters: Emitters, stem: str) -> list[str]:
+def _losses(sky: Skylight, emitters: Emitters, stem: str) -> list[str]:
     widths = [sun.angular_diameter for sun in emitters.discs if sun.angular_diameter]
+    painted = {sun.angular_diameter for sun in sky.suns}.difference(widths, [0.0])
     found = {
         "grid": any(width < WIDE_DISC for width in widths),
         "rays": any(width >= WIDE_DISC for width in widths),
         "radiosity": emitters.radiance is not None,
+        "missed": any(width < WIDE_DISC for width in painted),
     }
     losses = emitters.losses + [LOSSES[kind] for kind, lost in found.items() if lost]
     if stem != emitters.name:

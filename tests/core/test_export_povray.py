@@ -119,6 +119,13 @@ def test_wide_suns_are_painted(tmp_path):
     assert any("radiosity" in line for line in files.losses)
 
 
+def test_narrow_suns_in_the_map_are_said_to_be_lost(tmp_path):
+    for discs, lost in (("map", True), ("auto", False), ("lights", False)):
+        settings = ExportSettings("povray", discs=discs)
+        files = export_conversion(sky(sun(0.5), sun(30)), tmp_path, settings)
+        assert any("by luck" in line for line in files.losses) is lost
+
+
 def test_a_disc_s_shadow_fades_as_it_should(tmp_path):
     """Behind the straight edge of a roof, a sun of 8 degrees: the part of a disc beside a chord."""
     half = np.radians(4)
@@ -200,6 +207,7 @@ def test_without_suns_and_without_a_map(tmp_path, bare):
         "a // b */",
         "new\nline",
         "-D+W9",
+        "a=b",
     ],
 )
 def test_any_name(tmp_path, name):

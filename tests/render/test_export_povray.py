@@ -8,13 +8,10 @@ import pytest
 from sunsplit.core import ExportSettings, export_conversion, read_skylight
 from sunsplit.core.export.axes import Y_UP_LEFT, Z_UP
 from tests.core.test_export_povray import TURN
-from tests.exporting import converted, exported, reference, shadows_agree
+from tests.exporting import MEAN, converted, exported, reference, shadows_agree
 from tests.plates import ALBEDO, ORIENTATIONS, irradiance, unit
 from tests.povray_renders import picture, plate, renderer
 from tests.render.compare import estimate_of, means_agree, pixels_agree
-
-MEAN = 0.01
-"""Relative difference of the means of each channel (issue: 1 % of POV-Ray)."""
 
 SMOOTH = ["+A0.05", "+R3", "-J"]
 """Nine rays in a pixel where it needs them, as in the comment at the top of an exported scene."""
