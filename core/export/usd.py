@@ -1,0 +1,204 @@
+"""USD: a UsdLux DistantLight for each sun and a DomeLight for the map.
+
+By UsdLux a normalised DistantLight gives a surface that faces it an irradiance of its intensity
+(times 2 to its exposure), whatever its angle, which is that of a whole diameter. Blender's importer
+(as of 4.5 and 5.2) makes a lamp of four times that, and of twice the angle. No value serves both:
+the file holds one variant for either, and a setting says which is chosen until the user chooses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import sphere
+from ..errors import UnusableInput
+from ..suns import Sun
+from .axes import Z_UP, Axes, chosen_axes
+from .emitters import Emitters, emitters_of
+from .made import Made, Names, heading
+from .settings import ExportSettings, Reader
+from .skylight import Floats, Skylight
+from .stage import STAGE, Camera, Stage, Thing, Vector, mesh_of
+
+if TYPE_CHECKING:
+    from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade
+
+LAYOUT = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
+"""Unturned, a DomeLight has the image's centre at +Z, its left at +X and its pole at +Y, whatever
+the stage's up axis is. (DomeLight_1 follows the up axis, but is read wrongly by Blender, and not at
+all by older renderers.)"""
+
+FACTORS: dict[Reader, tuple[float, float]] = {"usdlux": (1.0, 1.0), "blender": (0.25, 0.5)}
+"""What a reader must be given, for it to arrive at the right irradiance and at the right angle."""
+
+VARIANTS = "reader"
+LIGHTS = "/Sunsplit"
+SCENE = "/Scene"
+
+FILM = 0.36
+"""Tenths of a metre: the width of the camera's film, 36 mm."""
+
+
+def made_for_usd(sky: Skylight, settings: ExportSettings) -> Made:
+    """Z up, as Sunsplit is. Raises UnusableInput without Pixar's library."""
+    try:
+        import pxr.UsdLux  # noqa: F401
+    except ImportError as error:
+        raise UnusableInput(
+            'USD needs Pixar\'s library: pip install "sunsplit[usd]" (Blender has it).'
+        ) from error
+    axes = chosen_axes(settings.up, Z_UP)
+    emitters = emitters_of(sky, "discs", settings.discs)
+    losses = (*emitters.losses, *_losses(emitters))
+    names = Names(f"{sky.name}.lights.usda", f"{sky.name}.scene.usda", f"{sky.name}.usd.exr")
+    about = "\n".join(heading(emitters, axes, losses))
+    reader = settings.reader if emitters.discs else None
+    lights = _written(about, axes, lambda stage: _lights(stage, emitters, axes, names.map, reader))
+    scene = _written(about, axes, lambda stage: _scene(stage, STAGE, axes))
+    _refer(scene, f"{SCENE}/Light", names.lights, reader)
+    return Made(
+        names, lights.ExportToString(), scene.ExportToString(), emitters.radiance, axes, losses
+    )
+
+
+def _losses(emitters: Emitters) -> list[str]:
+    if emitters.has_cells:
+        return ["Renderers blend the edges of the Voronoi map's cells over a pixel."]
+    return []
+
+
+def _written(about: str, axes: Axes, fill: Callable[[Usd.Stage], None]) -> Sdf.Layer:
+    """A layer that is no file, filled by way of a stage, which is gone when this returns."""
+    from pxr import Sdf, Usd, UsdGeom
+
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.documentation = about
+    stage = Usd.Stage.Open(layer)
+    up = UsdGeom.Tokens.z if axes.name == Z_UP.name else UsdGeom.Tokens.y
+    UsdGeom.SetStageUpAxis(stage, up)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    fill(stage)
+    return layer
+
+
+def _refer(layer: Sdf.Layer, path: str, file: str, reader: Reader | None) -> None:
+    """Bring a file in. Without a stage, which would look for the file, that is not there yet."""
+    from pxr import Sdf
+
+    prim = Sdf.CreatePrimInLayer(layer, path)
+    prim.specifier, prim.typeName = Sdf.SpecifierDef, "Xform"
+    prim.referenceList.prependedItems.append(Sdf.Reference(f"./{file}"))
+    if reader:
+        prim.variantSelections[VARIANTS] = reader
+
+
+def _lights(
+    stage: Usd.Stage, emitters: Emitters, axes: Axes, map_name: str, reader: Reader | None
+) -> None:
+    from pxr import UsdGeom, UsdLux
+
+    root = UsdGeom.Xform.Define(stage, LIGHTS).GetPrim()
+    stage.SetDefaultPrim(root)
+    paths = [f"{LIGHTS}/Sun_{n}" for n in range(1, len(emitters.discs) + 1)]
+    for path, sun in zip(paths, emitters.discs, strict=True):
+        _sun(UsdLux.DistantLight.Define(stage, path), sun, axes)
+    if reader:
+        variants = root.GetVariantSets().AddVariantSet(VARIANTS)
+        for name, factors in FACTORS.items():
+            variants.AddVariant(name)
+            variants.SetVariantSelection(name)
+            with variants.GetVariantEditContext():
+                for path, sun in zip(paths, emitters.discs, strict=True):
+                    _strength(UsdLux.DistantLight.Get(stage, path), sun, *factors)
+        variants.SetVariantSelection(reader)
+    if emitters.radiance is not None:
+        dome = UsdLux.DomeLight.Define(stage, f"{LIGHTS}/Map")
+        dome.CreateIntensityAttr(1.0)
+        dome.CreateExposureAttr(0.0)
+        dome.CreateTextureFileAttr(f"./{map_name}")
+        dome.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
+        _place(dome, axes.rotation_of_map(emitters.turn, LAYOUT))
+
+
+def _sun(light: UsdLux.DistantLight, sun: Sun, axes: Axes) -> None:
+    """All of a sun that every reader takes alike."""
+    strongest = sun.irradiance.max()
+    colour = sun.irradiance / strongest if strongest > 0 else np.ones(3)
+    light.CreateColorAttr(tuple(colour.tolist()))
+    light.CreateExposureAttr(0.0)
+    light.CreateNormalizeAttr(True)
+    # It shines along its -Z; how it is turned about that is all one.
+    back = axes.of(sun.to_light)
+    _place(light, np.stack([*sphere.tangents(back), back], axis=-1))
+
+
+def _strength(light: UsdLux.DistantLight, sun: Sun, brightness: float, width: float) -> None:
+    light.CreateIntensityAttr(float(sun.irradiance.max()) * brightness)
+    light.CreateAngleAttr(float(np.degrees(sun.angular_diameter)) * width)
+
+
+def _place(
+    thing: UsdGeom.Xformable, rotation: Floats, place: Floats | tuple[float, ...] = (0, 0, 0)
+) -> None:
+    """rotation: (3, 3), place: (3,), in the stage's axes."""
+    from pxr import Gf
+
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation, place
+    thing.AddTransformOp().Set(Gf.Matrix4d(matrix.T.tolist()))  # for vectors that are rows
+
+
+def _scene(stage: Usd.Stage, made: Stage, axes: Axes) -> None:
+    from pxr import UsdGeom
+
+    root = UsdGeom.Xform.Define(stage, SCENE).GetPrim()
+    stage.SetDefaultPrim(root)
+    _camera(UsdGeom.Camera.Define(stage, f"{SCENE}/Camera"), made.camera, axes)
+    UsdGeom.Scope.Define(stage, f"{SCENE}/Materials")
+    for name, thing in made.things.items():
+        _thing(stage, name, thing, axes)
+
+
+def _camera(to: UsdGeom.Camera, camera: Camera, axes: Axes) -> None:
+    from pxr import Gf
+
+    to.CreateHorizontalApertureAttr(FILM)
+    to.CreateVerticalApertureAttr(FILM * camera.height / camera.width)
+    to.CreateFocalLengthAttr(FILM / 2 / float(np.tan(np.radians(camera.field_of_view) / 2)))
+    to.CreateClippingRangeAttr(Gf.Vec2f(0.01, 1000.0))
+    _place(to, axes.matrix @ camera.frame, axes.of(np.array(camera.place)))
+
+
+def _thing(stage: Usd.Stage, name: str, thing: Thing, axes: Axes) -> None:
+    from pxr import UsdGeom, UsdShade, Vt
+
+    mesh, to = mesh_of(thing), UsdGeom.Mesh.Define(stage, f"{SCENE}/{name}")
+    points = axes.of(mesh.points).astype(np.float32)
+    to.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    to.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))
+    to.CreateFaceVertexCountsAttr(Vt.IntArray(len(mesh.triangles), 3))
+    to.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.triangles.astype(np.int32).ravel()))
+    to.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(axes.of(mesh.normals).astype(np.float32)))
+    to.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    to.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    material = _matt(stage, f"{SCENE}/Materials/{name}", thing.colour)
+    UsdShade.MaterialBindingAPI.Apply(to.GetPrim()).Bind(material)
+
+
+def _matt(stage: Usd.Stage, path: str, colour: Vector) -> UsdShade.Material:
+    """As near to Lambert's surface as UsdPreviewSurface goes: one that is as dense as air, whose
+    surface reflects nothing."""
+    from pxr import Sdf, UsdShade
+
+    material = UsdShade.Material.Define(stage, path)
+    shader = UsdShade.Shader.Define(stage, f"{path}/Surface")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(colour)
+    for name, value in (("roughness", 1.0), ("metallic", 0.0), ("ior", 1.0)):
+        shader.CreateInput(name, Sdf.ValueTypeNames.Float).Set(value)
+    surface = shader.CreateOutput("surface", Sdf.ValueTypeNames.Token)
+    material.CreateSurfaceOutput().ConnectToSource(surface)
+    return material
