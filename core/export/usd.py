@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
+from unicodedata import category
 
 import numpy as np
 
@@ -43,13 +44,19 @@ FILM = 0.36
 
 
 def made_for_usd(sky: Skylight, settings: ExportSettings) -> Made:
-    """Z up, as Sunsplit is. Raises UnusableInput without Pixar's library."""
+    """Z up, as Sunsplit is. Raises UnusableInput: Pixar's library is not there, or a name is such
+    that no USD file can refer to it."""
     try:
         import pxr.UsdLux  # noqa: F401
     except ImportError as error:
         raise UnusableInput(
             'USD needs Pixar\'s library: pip install "sunsplit[usd]" (Blender has it).'
         ) from error
+    if not _can_be_referred_to(sky.name):
+        raise UnusableInput(
+            f"USD cannot refer to files named {sky.name!r}: rename the conversion, without control "
+            "characters and backslashes."
+        )
     axes = chosen_axes(settings.up, Z_UP)
     emitters = emitters_of(sky, "discs", settings.discs)
     losses = (*emitters.losses, *_losses(emitters))
@@ -62,6 +69,12 @@ def made_for_usd(sky: Skylight, settings: ExportSettings) -> Made:
     return Made(
         names, lights.ExportToString(), scene.ExportToString(), emitters.radiance, axes, losses
     )
+
+
+def _can_be_referred_to(name: str) -> bool:
+    unspeakable = {"Cc", "Cs"}  # control characters, and what was no Unicode
+    spoken = not any(char == "\\" or category(char) in unspeakable for char in name)
+    return spoken and ":SDF_FORMAT_ARGS:" not in name
 
 
 def _losses(emitters: Emitters) -> list[str]:
