@@ -11,7 +11,7 @@ from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade, UsdValidation
 from sunsplit.core import ConversionSettings, convert, sphere
 from sunsplit.core.errors import UnusableInput
 from sunsplit.core.export.axes import Y_UP, Z_UP
-from sunsplit.core.export.run import export
+from sunsplit.core.export.run import export_conversion
 from sunsplit.core.export.settings import ExportSettings
 from sunsplit.core.export.skylight import Skylight, skylight_of
 from sunsplit.core.export.stage import STAGE, mesh_of
@@ -55,7 +55,7 @@ def sunless(name: str = "sunless") -> Skylight:
 
 def opened(made: Skylight, folder, which: str = "lights", **settings: str) -> Usd.Stage:
     return Usd.Stage.Open(
-        str(getattr(export(made, folder, ExportSettings("usd", **settings)), which))
+        str(getattr(export_conversion(made, folder, ExportSettings("usd", **settings)), which))
     )
 
 
@@ -109,7 +109,8 @@ def test_the_checker_would_find_a_missing_map(tmp_path, which):
 @pytest.mark.parametrize("which", ["lights", "scene"])
 def test_suns_by_the_specification(tmp_path, up, which):
     made = sky(turn=3)
-    found = lamps(opened(made, tmp_path, which, up=up))
+    stage = opened(made, tmp_path, which, up=up)
+    found = lamps(stage)
     assert [lamp.GetPrim().GetName() for lamp in found] == [f"Sun_{n}" for n in range(1, 7)]
     for lamp, sun in zip(found, made.suns, strict=True):
         assert facing_irradiance(lamp) == pytest.approx(sun.irradiance, rel=1e-6)
@@ -126,7 +127,8 @@ def test_suns_by_the_specification(tmp_path, up, which):
 def test_suns_for_blenders_importer(tmp_path, which):
     """A quarter of the intensity, and half of the angle."""
     made = sky()
-    found = lamps(opened(made, tmp_path, which, reader="blender"))
+    stage = opened(made, tmp_path, which, reader="blender")
+    found = lamps(stage)
     for lamp, sun in zip(found, made.suns, strict=True):
         strength = lamp.GetIntensityAttr().Get() * np.array(lamp.GetColorAttr().Get())
         assert 4 * strength == pytest.approx(sun.irradiance, rel=1e-6)
@@ -147,7 +149,8 @@ def test_the_reader_can_be_chosen_afterwards(tmp_path):
 
 def test_a_black_sun(tmp_path):
     made = Skylight("black", (sun(direction(0, 30), 0.1, (0, 0, 0)),), None, False, np.eye(3))
-    (lamp,) = lamps(opened(made, tmp_path))
+    stage = opened(made, tmp_path)
+    (lamp,) = lamps(stage)
     assert (facing_irradiance(lamp) == 0).all()
 
 
@@ -158,7 +161,8 @@ def test_how_the_map_lies(tmp_path, up, turn, which):
     """By OpenEXR's layout, which the schema of DomeLight quotes: latitude to +Y, longitude 0 at +Z
     in the image's middle, a quarter to the left of it +X."""
     made = sky(turn=turn)
-    dome = the_map(opened(made, tmp_path, which, up=up))
+    stage = opened(made, tmp_path, which, up=up)
+    dome = the_map(stage)
     directions = np.random.default_rng(1).normal(size=(2000, 3))
     x, y, z = to_world(dome)[:3, :3].T @ AXES[up].of(directions).T
     u = 0.5 - np.arctan2(x, z) / (2 * np.pi)
@@ -182,11 +186,11 @@ def test_the_stage(tmp_path, up, axis, which):
 
 
 def test_without_a_map_or_suns(tmp_path):
-    files = export(bare(), tmp_path / "bare", ExportSettings("usd"))
+    files = export_conversion(bare(), tmp_path / "bare", ExportSettings("usd"))
     assert files.map is None
-    assert not any(
-        prim.IsA(UsdLux.DomeLight) for prim in Usd.Stage.Open(str(files.scene)).Traverse()
-    )
+    stage = Usd.Stage.Open(str(files.scene))
+    assert not any(prim.IsA(UsdLux.DomeLight) for prim in stage.Traverse())
+    assert len(lamps(stage)) == len(WIDTHS)
     stage = opened(sunless(), tmp_path, "scene")
     assert not lamps(stage)
     assert the_map(stage)
@@ -194,7 +198,7 @@ def test_without_a_map_or_suns(tmp_path):
 
 def test_suns_painted_into_the_map(tmp_path):
     made = sky()
-    files = export(made, tmp_path, ExportSettings("usd", discs="map"))
+    files = export_conversion(made, tmp_path, ExportSettings("usd", discs="map"))
     stage = Usd.Stage.Open(str(files.lights))
     (point,) = lamps(stage)
     assert point.GetAngleAttr().Get() == 0
@@ -204,7 +208,7 @@ def test_suns_painted_into_the_map(tmp_path):
 
 def test_cells_are_told_to_be_blended(tmp_path):
     conversion = convert(environment(sunny()), ConversionSettings(residual="voronoi"))
-    files = export(skylight_of(conversion), tmp_path, ExportSettings("usd"))
+    files = export_conversion(skylight_of(conversion), tmp_path, ExportSettings("usd"))
     assert "Voronoi" in " ".join(files.losses)
 
 
@@ -236,7 +240,7 @@ def test_names(tmp_path, name):
 )
 def test_names_that_usd_cannot_say(tmp_path, name):
     with pytest.raises(UnusableInput, match="rename the conversion"):
-        export(sky(name), tmp_path, ExportSettings("usd"))
+        export_conversion(sky(name), tmp_path, ExportSettings("usd"))
     assert not list(tmp_path.iterdir())
 
 
@@ -277,7 +281,7 @@ def test_without_the_library(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pxr", None)
     monkeypatch.delitem(sys.modules, "pxr.UsdLux")
     with pytest.raises(UnusableInput, match=r'pip install "sunsplit\[usd\]"'):
-        export(sky(), tmp_path, ExportSettings("usd"))
+        export_conversion(sky(), tmp_path, ExportSettings("usd"))
     assert not list(tmp_path.iterdir())
 
 
