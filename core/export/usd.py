@@ -19,28 +19,26 @@ from ..errors import UnusableInput
 from ..suns import Sun
 from .axes import Z_UP, Axes, chosen_axes
 from .emitters import Emitters, emitters_of
-from .made import Made, Names, heading
+from .made import Made, heading
+from .names import names_of
 from .settings import ExportSettings, Reader
-from .skylight import Floats, Skylight
-from .stage import STAGE, Camera, Stage, Thing, Vector, mesh_of
+from .skylight import Skylight
+from .stage import STAGE
+from .usd_scene import SCENE, add_scene, place_in_stage
 
 if TYPE_CHECKING:
-    from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdShade
+    from pxr import Sdf, Usd, UsdLux
 
 LAYOUT = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
 """Unturned, a DomeLight has the image's centre at +Z, its left at +X and its pole at +Y, whatever
-the stage's up axis is. (DomeLight_1 follows the up axis, but is read wrongly by Blender, and not at
-all by older renderers.)"""
+the stage's up axis is. (DomeLight_1 follows the up axis; but Blender turns it wrongly there, and
+older renderers do not know it.)"""
 
 FACTORS: dict[Reader, tuple[float, float]] = {"usdlux": (1.0, 1.0), "blender": (0.25, 0.5)}
 """What a reader must be given, for it to arrive at the right irradiance and at the right angle."""
 
 VARIANTS = "reader"
 LIGHTS = "/Sunsplit"
-SCENE = "/Scene"
-
-FILM = 0.36
-"""Tenths of a metre: the width of the camera's film, 36 mm."""
 
 
 def made_for_usd(sky: Skylight, settings: ExportSettings) -> Made:
@@ -59,12 +57,12 @@ def made_for_usd(sky: Skylight, settings: ExportSettings) -> Made:
         )
     axes = chosen_axes(settings.up, Z_UP)
     emitters = emitters_of(sky, "discs", settings.discs)
-    losses = (*emitters.losses, *_losses(emitters))
-    names = Names(f"{sky.name}.lights.usda", f"{sky.name}.scene.usda", f"{sky.name}.usd.exr")
-    about = "\n".join(heading(emitters, axes, losses))
     reader = settings.reader if emitters.discs else None
+    losses = (*emitters.losses, *_losses(emitters, reader))
+    names = names_of("usd", sky.name)
+    about = "\n".join(heading(emitters, axes, losses))
     lights = _written(about, axes, lambda stage: _lights(stage, emitters, axes, names.map, reader))
-    scene = _written(about, axes, lambda stage: _scene(stage, STAGE, axes))
+    scene = _written(about, axes, lambda stage: add_scene(stage, STAGE, axes))
     _refer(scene, f"{SCENE}/Light", names.lights, reader)
     return Made(
         names, lights.ExportToString(), scene.ExportToString(), emitters.radiance, axes, losses
@@ -77,10 +75,21 @@ def _can_be_referred_to(name: str) -> bool:
     return spoken and ":SDF_FORMAT_ARGS:" not in name
 
 
-def _losses(emitters: Emitters) -> list[str]:
+def _losses(emitters: Emitters, reader: Reader | None) -> list[str]:
+    lines = []
     if emitters.has_cells:
-        return ["Renderers blend the edges of the Voronoi map's cells over a pixel."]
-    return []
+        lines.append("Renderers blend the edges of the Voronoi map's cells over a pixel.")
+    if reader == "usdlux":
+        lines.append(
+            "Blender's own importer takes such suns for four times as strong and twice as wide: "
+            'for it, choose the reader "blender".'
+        )
+    if reader == "blender":
+        lines.append(
+            "The suns are as Blender's importer takes them; to others they are a quarter as strong "
+            'and half as wide: for them, choose the reader "usdlux".'
+        )
+    return lines
 
 
 def _written(about: str, axes: Axes, fill: Callable[[Usd.Stage], None]) -> Sdf.Layer:
@@ -133,7 +142,7 @@ def _lights(
         dome.CreateExposureAttr(0.0)
         dome.CreateTextureFileAttr(f"./{map_name}")
         dome.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
-        _place(dome, axes.rotation_of_map(emitters.turn, LAYOUT))
+        place_in_stage(dome, axes.rotation_of_map(emitters.turn, LAYOUT))
 
 
 def _sun(light: UsdLux.DistantLight, sun: Sun, axes: Axes) -> None:
@@ -145,73 +154,9 @@ def _sun(light: UsdLux.DistantLight, sun: Sun, axes: Axes) -> None:
     light.CreateNormalizeAttr(True)
     # It shines along its -Z; how it is turned about that is all one.
     back = axes.of(sun.to_light)
-    _place(light, np.stack([*sphere.tangents(back), back], axis=-1))
+    place_in_stage(light, np.stack([*sphere.tangents(back), back], axis=-1))
 
 
 def _strength(light: UsdLux.DistantLight, sun: Sun, brightness: float, width: float) -> None:
     light.CreateIntensityAttr(float(sun.irradiance.max()) * brightness)
     light.CreateAngleAttr(float(np.degrees(sun.angular_diameter)) * width)
-
-
-def _place(
-    thing: UsdGeom.Xformable, rotation: Floats, place: Floats | tuple[float, ...] = (0, 0, 0)
-) -> None:
-    """rotation: (3, 3), place: (3,), in the stage's axes."""
-    from pxr import Gf
-
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = rotation, place
-    thing.AddTransformOp().Set(Gf.Matrix4d(matrix.T.tolist()))  # for vectors that are rows
-
-
-def _scene(stage: Usd.Stage, made: Stage, axes: Axes) -> None:
-    from pxr import UsdGeom
-
-    root = UsdGeom.Xform.Define(stage, SCENE).GetPrim()
-    stage.SetDefaultPrim(root)
-    _camera(UsdGeom.Camera.Define(stage, f"{SCENE}/Camera"), made.camera, axes)
-    UsdGeom.Scope.Define(stage, f"{SCENE}/Materials")
-    for name, thing in made.things.items():
-        _thing(stage, name, thing, axes)
-
-
-def _camera(to: UsdGeom.Camera, camera: Camera, axes: Axes) -> None:
-    from pxr import Gf
-
-    to.CreateHorizontalApertureAttr(FILM)
-    to.CreateVerticalApertureAttr(FILM * camera.height / camera.width)
-    to.CreateFocalLengthAttr(FILM / 2 / float(np.tan(np.radians(camera.field_of_view) / 2)))
-    to.CreateClippingRangeAttr(Gf.Vec2f(0.01, 1000.0))
-    _place(to, axes.matrix @ camera.frame, axes.of(np.array(camera.place)))
-
-
-def _thing(stage: Usd.Stage, name: str, thing: Thing, axes: Axes) -> None:
-    from pxr import UsdGeom, UsdShade, Vt
-
-    mesh, to = mesh_of(thing), UsdGeom.Mesh.Define(stage, f"{SCENE}/{name}")
-    points = axes.of(mesh.points).astype(np.float32)
-    to.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-    to.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(axis=0), points.max(axis=0)])))
-    to.CreateFaceVertexCountsAttr(Vt.IntArray(len(mesh.triangles), 3))
-    to.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.triangles.astype(np.int32).ravel()))
-    to.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(axes.of(mesh.normals).astype(np.float32)))
-    to.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
-    to.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    material = _matt(stage, f"{SCENE}/Materials/{name}", thing.colour)
-    UsdShade.MaterialBindingAPI.Apply(to.GetPrim()).Bind(material)
-
-
-def _matt(stage: Usd.Stage, path: str, colour: Vector) -> UsdShade.Material:
-    """As near to Lambert's surface as UsdPreviewSurface goes: one that is as dense as air, whose
-    surface reflects nothing."""
-    from pxr import Sdf, UsdShade
-
-    material = UsdShade.Material.Define(stage, path)
-    shader = UsdShade.Shader.Define(stage, f"{path}/Surface")
-    shader.CreateIdAttr("UsdPreviewSurface")
-    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(colour)
-    for name, value in (("roughness", 1.0), ("metallic", 0.0), ("ior", 1.0)):
-        shader.CreateInput(name, Sdf.ValueTypeNames.Float).Set(value)
-    surface = shader.CreateOutput("surface", Sdf.ValueTypeNames.Token)
-    material.CreateSurfaceOutput().ConnectToSource(surface)
-    return material

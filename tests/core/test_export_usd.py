@@ -8,13 +8,19 @@ import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade, UsdValidation
 
-from sunsplit.core import ConversionSettings, convert, sphere
+from sunsplit.core import (
+    ConversionSettings,
+    ExportSettings,
+    convert,
+    export_conversion,
+    skylight_of,
+    sphere,
+)
 from sunsplit.core.errors import UnusableInput
 from sunsplit.core.export.axes import Y_UP, Z_UP
-from sunsplit.core.export.run import export_conversion
-from sunsplit.core.export.settings import ExportSettings
-from sunsplit.core.export.skylight import Skylight, skylight_of
+from sunsplit.core.export.skylight import Skylight
 from sunsplit.core.export.stage import STAGE, mesh_of
+from sunsplit.core.settings import BadSetting
 from sunsplit.core.suns import Sun
 from tests.files import noise, sunny, sunsplit
 from tests.maps import direction, environment
@@ -145,6 +151,19 @@ def test_the_reader_can_be_chosen_afterwards(tmp_path):
     assert variants.GetVariantSelection() == "usdlux"
     variants.SetVariantSelection("blender")
     assert [4 * lamp.GetIntensityAttr().Get() for lamp in lamps(stage)] == pytest.approx(before)
+
+
+@pytest.mark.parametrize(("reader", "other"), [("usdlux", "blender"), ("blender", "usdlux")])
+def test_whom_the_suns_are_not_for_is_said(tmp_path, reader, other):
+    files = export_conversion(sky(), tmp_path, ExportSettings("usd", reader=reader))
+    assert f'"{other}"' in files.losses[-1]
+    assert files.losses[-1] in Usd.Stage.Open(str(files.scene)).GetRootLayer().documentation
+    assert not export_conversion(sunless(), tmp_path, ExportSettings("usd", reader=reader)).losses
+
+
+def test_an_unknown_reader():
+    with pytest.raises(BadSetting, match="reader must be one of usdlux, blender"):
+        ExportSettings("usd", reader="karma")
 
 
 def test_a_black_sun(tmp_path):
