@@ -152,8 +152,9 @@ def test_no_map_and_no_suns(tmp_path):
 
 
 @pytest.mark.parametrize("up", ["usual", "y"])
-def test_the_scene_that_comes_with_it(tmp_path, sunrise, wanted, lights, up):
+def test_the_scene_that_comes_with_it(tmp_path, sunrise, wanted, up):
     """Its camera, meshes and materials as they are imported."""
+    lights = converted(sunrise, tmp_path)
     folder = exported(lights, tmp_path / "usd", "usd", "--up", up, "--reader", "blender")
     scene = imported(folder / f"{sunrise.stem}.scene.usda")
     (scene.camera,) = (thing for thing in scene.objects if thing.type == "CAMERA")
