@@ -42,6 +42,7 @@ def skylight_of_scene(scene: bpy.types.Scene) -> Skylight:
     """The light of a conversion as Cycles renders it at the current frame, whatever was changed in
     world and lamps. Raises UnusableInput, CannotWrite."""
     lamps = [entry.lamp for entry in scene.sunsplit.lamps if entry.lamp]
+    # First, as it also brings what drivers and keyframes set in the world up to date.
     suns = suns_of_lamps(scene, lamps)
     world = map_of_world(scene.world, scene.render.engine) if scene.world else None
     if world is None and not suns:

@@ -118,9 +118,7 @@ def _from_pixels(
     return environment_from_strips(held, Path(name).stem, name)
 
 
-def _colour_of(
-    pixels: NDArray[np.float32], shape: tuple[int, int, int]
-) -> NDArray[np.float32]:
+def _colour_of(pixels: NDArray[np.float32], shape: tuple[int, int, int]) -> NDArray[np.float32]:
     """Rows downwards, three channels, of numbers in Blender's order."""
     pixels = pixels.reshape(shape)[::-1]
     return pixels[..., :3] if shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty
+from bpy.props import EnumProperty, FloatProperty, StringProperty
 
+from ..core.errors import SunsplitError
+from .exported import remember
 from .modal import InSteps
-from .properties import CHOICES
+from .properties import CHOICES, EXPORT_CHOICES
 from .skies import lacks_suns
 from .steps import Steps
 
@@ -170,6 +172,82 @@ class SUNSPLIT_OT_select_suns(bpy.types.Operator):
         select_lamps(context, found)
         self.report({"INFO"}, f"{len(found)} selected")
         return {"FINISHED"} if found else {"CANCELLED"}
+
+
+class SUNSPLIT_OT_export(bpy.types.Operator):
+    """Write suns and world, as they are now, as files of another renderer, with a small scene"""
+
+    bl_idname = "sunsplit.export"
+    bl_label = "Export Light"
+    bl_options = {"REGISTER"}  # noqa: RUF012 - nothing changes: there is nothing to undo
+
+    __annotations__ = EXPORT_CHOICES | {
+        "directory": StringProperty(
+            name="Folder",
+            description="Where the files are written; nothing: beside the .blend file",
+            subtype="DIR_PATH",
+            options={"SKIP_SAVE", "HIDDEN"},
+        ),
+        "filename": StringProperty(
+            name="Name",
+            description="What the names of the files begin with; nothing: the name of the map",
+            subtype="FILE_NAME",
+            options={"SKIP_SAVE", "HIDDEN"},
+        ),
+    }
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _is_converted(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        from .exporting import map_name
+
+        for name, value in self._chosen(context.scene).items():
+            setattr(self, name, value)
+        if not self.directory and bpy.data.filepath:
+            self.directory = bpy.path.abspath("//")
+        self.filename = self.filename or map_name(context.scene)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        from ..core.export.settings import ExportSettings
+        from .exporting import export_scene
+
+        scene, chosen = context.scene, self._chosen(context.scene)
+        try:
+            settings = ExportSettings(**chosen)
+            files = export_scene(scene, self.directory, settings, self.filename)
+        except SunsplitError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for name, value in chosen.items():
+            setattr(scene.sunsplit.export, name, value)
+        for sentence in files.losses:
+            self.report({"INFO"}, sentence)
+        headline = f"{len(files.paths)} files written to {files.lights.parent}"
+        self.report({"INFO"}, headline)
+        remember(scene, [headline, f"Axes: {files.axes}", *files.losses])
+        return {"FINISHED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        from .panel import draw_export
+
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        draw_export(self.layout, self)
+
+    def _chosen(self, scene: bpy.types.Scene) -> dict[str, object]:
+        """The scene's settings, and before them what was given as an argument."""
+        given = {name for name in EXPORT_CHOICES if self.properties.is_property_set(name)}
+        chosen = {
+            name: getattr(self if name in given else scene.sunsplit.export, name)
+            for name in EXPORT_CHOICES
+        }
+        if chosen["format"] == "gltf" and "up" not in given:
+            chosen["up"] = "usual"  # there is no choice, and what other formats got does not count
+        return chosen
 
 
 def _is_converted(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
