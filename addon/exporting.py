@@ -11,7 +11,7 @@ import numpy as np
 from mathutils import Color
 
 from ..core.errors import UnusableInput
-from ..core.export.run import ExportedFiles, export
+from ..core.export.run import ExportedFiles, export_conversion
 from ..core.export.settings import ExportSettings
 from ..core.export.skylight import Floats, Skylight
 from .lamp_light import suns_of_lamps
@@ -35,7 +35,7 @@ def export_scene(
     sky = skylight_of_scene(scene)
     if name:
         sky = replace(sky, name=_safe(name))
-    return export(sky, bpy.path.abspath(folder or "//"), settings)
+    return export_conversion(sky, bpy.path.abspath(folder or "//"), settings)
 
 
 def skylight_of_scene(scene: bpy.types.Scene) -> Skylight:
