@@ -14,6 +14,7 @@ from ..core.errors import UnusableInput
 from ..core.export.run import ExportedFiles, export_conversion
 from ..core.export.settings import ExportSettings
 from ..core.export.skylight import Floats, Skylight
+from .images import AS_IT_IS, working_space
 from .lamp_light import suns_of_lamps
 from .trace import lighting_textures
 from .world_map import map_of_world
@@ -71,9 +72,9 @@ def _safe(name: str) -> str:
 
 def _in_rec709(sky: Skylight) -> Skylight:
     """From the colours that Blender works in, which the user of Blender 5 may choose."""
-    matrix = np.array([Color(one).from_scene_linear_to_rec709_linear() for one in np.eye(3)]).T
-    if np.allclose(matrix, np.eye(3), rtol=0, atol=1e-6):
+    if working_space() == AS_IT_IS:
         return sky
+    matrix = np.array([Color(one).from_scene_linear_to_rec709_linear() for one in np.eye(3)]).T
 
     def turned(colour: Floats) -> Floats:
         """What Rec.709 cannot show is as near as it can."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..core.environment import LUMINANCE_WEIGHTS
 from ..core.errors import UnusableInput
 from ..core.suns import Sun
+from .lamps import LEAST
 from .trace import Place, constant, source_of
 
 Floats = NDArray[np.float64]
@@ -61,7 +62,10 @@ def _rendered_in(holder: bpy.types.LayerCollection) -> Iterator[bpy.types.Object
 def _sun(lamp: bpy.types.Object) -> Sun:
     """lamp: evaluated."""
     data = lamp.data
-    strength = data.energy * 2.0**data.exposure * np.array(data.color, np.float64)
+    factor = 2.0**data.exposure
+    if factor < 1.001 * LEAST:
+        factor = 0.0
+    strength = data.energy * factor * np.array(data.color, np.float64)
     if data.use_temperature:
         strength = strength * np.array(data.temperature_color, np.float64)
     strength = strength * _gain_of_nodes(data)

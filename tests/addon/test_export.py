@@ -52,8 +52,9 @@ def scene():
 @pytest.fixture(scope="module")
 def two_suns(tmp_path_factory):
     """A white and a red sun over a sky that has colours of its own in each direction."""
-    v, u = np.indices((128, 256)) / 128
-    pixels = sky(256, 0.2) + np.stack([v, u / 2, 0.3 + 0.2 * np.sin(9 * u + 5 * v)], axis=-1) / 4
+    v, u = np.indices((128, 256)) / 128 * np.pi
+    waves = np.stack([np.sin(v / 2), np.sin(v) * np.sin(u), np.sin(v) * np.cos(3 * u + 5 * v)], -1)
+    pixels = sky(256, 0.4) + 0.1 * waves
     paint_disc(pixels, direction(40, 30), 2, (900, 900, 900))
     paint_disc(pixels, direction(-100, 10), 3, (600, 100, 50))
     return write_map(tmp_path_factory.mktemp("maps") / "two suns.exr", pixels)
@@ -101,7 +102,7 @@ def what_the_world_shows(scene, folder: Path, width: int = 64) -> np.ndarray:
         bpy.data.objects.remove(camera)
 
 
-def assert_the_map_is_what_the_world_shows(scene, folder: Path, **tolerance: float) -> None:
+def assert_the_map_is_what_the_world_shows(scene, folder: Path) -> None:
     seen = what_the_world_shows(scene, folder)
     height, width = seen.shape[:2]
     exported = skylight_of_scene(scene)
@@ -110,7 +111,7 @@ def assert_the_map_is_what_the_world_shows(scene, folder: Path, **tolerance: flo
     found = look_up(exported.radiance, in_map, exported.has_cells)
     assert len(found) > 1000
     assert seen.std() > 0.01
-    assert found == pytest.approx(seen.reshape(-1, 3), **({"rel": HALF, "abs": 1e-5} | tolerance))
+    assert found == pytest.approx(seen.reshape(-1, 3), rel=HALF, abs=1e-5)
 
 
 def test_nothing_is_lost_of_a_conversion(scene, sunrise):
@@ -229,7 +230,7 @@ def test_lamps_that_do_more_than_shine_are_refused(scene, texture):
     emission = with_nodes(lamp.data)
     falloff = lamp.data.node_tree.nodes.new("ShaderNodeLightFalloff")
     lamp.data.node_tree.links.new(falloff.outputs[0], emission.inputs["Strength"])
-    with pytest.raises(RuntimeError, match=f'nodes of the lamp "{lamp.data.name}" do more'):
+    with pytest.raises(RuntimeError, match=r"nodes of the lamp .Sun 1 \(.*\). do more"):
         bpy.ops.sunsplit.export(directory="/nowhere")
     falloff.id_data.nodes.remove(falloff)
     lamp.data.energy = -1
@@ -320,16 +321,15 @@ def test_mirrored_and_tilted_mappings(scene, two_suns, tmp_path, scale):
 
 
 def test_a_voronoi_map_keeps_its_cells(scene, two_suns, tmp_path):
-    hdri_world(scene, two_suns)
+    # Tilted, as else rays would meet the edges of pixels, where rounding decides.
+    add_mapping(hdri_world(scene, two_suns)).inputs["Rotation"].default_value = 0.3, -0.7, 2.0
     bpy.ops.sunsplit.convert(lights=2, residual="voronoi", residual_samples=40)
-    turn_by(scene, 0.4)
     assert skylight_of_scene(scene).has_cells
     seen, found = what_the_world_shows(scene, tmp_path), skylight_of_scene(scene)
     in_map = pixel_centres(np.arange(seen.size // 3), seen.shape[1], seen.shape[0]) @ found.turn
     shown = look_up(found.radiance, in_map, found.has_cells)
-    # On an edge between two cells, rounding decides.
     same = np.isclose(shown, seen.reshape(-1, 3), rtol=HALF, atol=1e-5).all(axis=-1)
-    assert same.mean() > 0.995
+    assert same.mean() > 0.999
 
 
 def test_lamps_only(scene, two_suns):
@@ -460,7 +460,7 @@ def test_a_name_and_settings(scene, texture, tmp_path):
 
 def test_what_cannot_be_is_said(scene, texture, tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(RuntimeError, match="it is a file. Nothing was changed"):
+    with pytest.raises(RuntimeError, match=r"it is a file\. Nothing was changed"):
         bpy.ops.sunsplit.export(format="pbrt", directory=str(tmp_path / "file"))
     with pytest.raises(RuntimeError, match="Say into which folder"):
         bpy.ops.sunsplit.export(format="pbrt")
