@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,13 +13,11 @@ from ..core.errors import UnusableInput
 from ..core.export.run import ExportedFiles, export_conversion
 from ..core.export.settings import ExportSettings
 from ..core.export.skylight import Floats, Skylight
+from .exported import as_name
 from .images import AS_IT_IS, working_space
 from .lamp_light import suns_of_lamps
 from .trace import lighting_textures
 from .world_map import map_of_world
-
-UNSAFE = re.compile(r'[\x00-\x1f/\\:*?"<>|]')
-"""Characters that some system does not have in the names of files."""
 
 
 def export_scene(
@@ -35,7 +32,7 @@ def export_scene(
         raise UnusableInput("Say into which folder: this file has none yet, as it is not saved.")
     sky = skylight_of_scene(scene)
     if name:
-        sky = replace(sky, name=_safe(name))
+        sky = replace(sky, name=as_name(name))
     return export_conversion(sky, bpy.path.abspath(folder or "//"), settings)
 
 
@@ -57,17 +54,13 @@ def skylight_of_scene(scene: bpy.types.Scene) -> Skylight:
 def map_name(scene: bpy.types.Scene) -> str:
     """What to call a scene's map: as its HDRI, or else as its world."""
     if scene.world is None:
-        return _safe(scene.name)
+        return as_name(scene.name)
     try:
         found = lighting_textures(scene.world, scene.render.engine)
     except UnusableInput:
         found = []
     images = [part.texture.node.image for part in found if part.texture.node.image]
-    return _safe(Path(images[0].name).stem if images else scene.world.name)
-
-
-def _safe(name: str) -> str:
-    return UNSAFE.sub("_", name).strip() or "world"
+    return as_name(Path(images[0].name).stem if images else scene.world.name)
 
 
 def _in_rec709(sky: Skylight) -> Skylight:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import bpy
@@ -200,11 +201,14 @@ class SUNSPLIT_OT_export(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return _is_converted(cls, context)
 
+    _in_browser = False
+
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         from .exporting import map_name
 
         for name, value in self._chosen(context.scene).items():
             setattr(self, name, value)
+        self._in_browser = True
         if not self.directory and bpy.data.filepath:
             self.directory = bpy.path.abspath("//")
         self.filename = self.filename or map_name(context.scene)
@@ -216,6 +220,8 @@ class SUNSPLIT_OT_export(bpy.types.Operator):
         from .exporting import export_scene
 
         scene, chosen = context.scene, self._chosen(context.scene)
+        if chosen["format"] == "gltf" and (self._in_browser or not self._is_given("up")):
+            del chosen["up"]  # there is no choice, and what it is for other formats stays
         try:
             settings = ExportSettings(**chosen)
             files = export_scene(scene, self.directory, settings, self.filename)
@@ -232,22 +238,25 @@ class SUNSPLIT_OT_export(bpy.types.Operator):
         return {"FINISHED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        from .panel import draw_export
+        from .panel import draw_export, draw_replaced
 
         self.layout.use_property_split = True
         self.layout.use_property_decorate = False
         draw_export(self.layout, self)
+        draw_replaced(self.layout, Path(self.directory), self.format, self.filename)
+
+    def check(self, context: bpy.types.Context) -> bool:
+        return True  # another name or folder: draw what would be replaced there
 
     def _chosen(self, scene: bpy.types.Scene) -> dict[str, object]:
         """The scene's settings, and before them what was given as an argument."""
-        given = {name for name in EXPORT_CHOICES if self.properties.is_property_set(name)}
-        chosen = {
-            name: getattr(self if name in given else scene.sunsplit.export, name)
+        return {
+            name: getattr(self if self._is_given(name) else scene.sunsplit.export, name)
             for name in EXPORT_CHOICES
         }
-        if chosen["format"] == "gltf" and "up" not in given:
-            chosen["up"] = "usual"  # there is no choice, and what other formats got does not count
-        return chosen
+
+    def _is_given(self, name: str) -> bool:
+        return self.properties.is_property_set(name)
 
 
 def _is_converted(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:

@@ -7,12 +7,14 @@ turn, tint and soften. Settings are folded away.
 from __future__ import annotations
 
 import textwrap
+from pathlib import Path
 
 import bpy
 from bl_ui.utils import PresetPanel
 
+from ..core.export.names import names_of
 from .controls import FACTORS, changed_factors, rotation_control
-from .exported import said_of
+from .exported import as_name, said_of
 from .jobs import Job
 from .overlay import draw_switch
 from .skies import lacks_suns
@@ -263,3 +265,14 @@ def draw_export(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
         layout.prop(settings, "up")
     if settings.format != "usd":  # which has discs
         layout.prop(settings, "discs")
+
+
+def draw_replaced(layout: bpy.types.UILayout, folder: Path, kind: str, name: str) -> None:
+    """Which files of an export there are already."""
+    names = names_of(kind, as_name(name))
+    there = [one for one in (names.lights, names.scene, names.map) if (folder / one).is_file()]
+    if there:
+        column = layout.column(align=True)
+        column.label(text="Replaces:", icon="ERROR")
+        for one in there:
+            column.label(text=one, icon="BLANK1")

@@ -453,9 +453,19 @@ def test_a_name_and_settings(scene, texture, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         *("my_sky_ 1.lights.xml", "my_sky_ 1.mitsuba.exr", "my_sky_ 1.scene.xml")
     ]
+    again = tmp_path / "again"  # as who clicks on an older file in the file browser
+    bpy.ops.sunsplit.export(directory=str(again), filename="my_sky_ 1.lights.xml")
+    assert {path.name for path in again.iterdir()} < {path.name for path in tmp_path.iterdir()}
     text = (tmp_path / "my_sky_ 1.lights.xml").read_text()
     assert "Z up" in text
     assert "directional" not in text
+
+
+@pytest.mark.skipif("gltf" not in FORMATS, reason="this version does not export glTF")
+def test_the_axis_of_other_formats_does_not_disturb_gltf(scene, texture, tmp_path):
+    scene.sunsplit.export.up = "z"
+    assert bpy.ops.sunsplit.export(format="gltf", directory=str(tmp_path)) == {"FINISHED"}
+    assert scene.sunsplit.export.up == "z"
 
 
 def test_what_cannot_be_is_said(scene, texture, tmp_path):
