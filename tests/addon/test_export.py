@@ -492,3 +492,17 @@ def test_a_scene_that_is_not_converted(scene):
     empty_world(scene)
     with pytest.raises(RuntimeError, match="not converted"):
         bpy.ops.sunsplit.export(directory="/nowhere")
+
+
+@pytest.mark.skipif(bpy.app.version < (5, 0), reason="before 5.0 Blender works in Rec.709")
+@pytest.mark.parametrize("when", ["after", "before"])
+def test_another_working_space_gives_the_same_light(scene, sunrise, when):
+    """Files are in Rec.709 whatever Blender works in when it converts and when it exports."""
+    hdri_world(scene, sunrise)
+    if when == "before":
+        bpy.ops.wm.set_working_color_space(working_space="ACEScg")
+    bpy.ops.sunsplit.convert()
+    if when == "after":
+        bpy.ops.wm.set_working_color_space(working_space="ACEScg")
+    source = load(sunrise).scalar_irradiance
+    assert skylight_of_scene(scene).scalar_irradiance == pytest.approx(source, rel=2e-5)
