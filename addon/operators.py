@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -224,7 +226,8 @@ class SUNSPLIT_OT_export(bpy.types.Operator):
             del chosen["up"]  # there is no choice, and what it is for other formats stays
         try:
             settings = ExportSettings(**chosen)
-            files = export_scene(scene, self.directory, settings, self.filename)
+            with _waiting(context):
+                files = export_scene(scene, self.directory, settings, self.filename)
         except SunsplitError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -257,6 +260,19 @@ class SUNSPLIT_OT_export(bpy.types.Operator):
 
     def _is_given(self, name: str) -> bool:
         return self.properties.is_property_set(name)
+
+
+@contextmanager
+def _waiting(context: bpy.types.Context) -> Iterator[None]:
+    """Shows by the mouse that Blender is busy: with a wide map for some seconds."""
+    window = None if bpy.app.background else context.window
+    if window:
+        window.cursor_modal_set("WAIT")
+    try:
+        yield
+    finally:
+        if window:
+            window.cursor_modal_restore()
 
 
 def _is_converted(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:

@@ -165,6 +165,14 @@ def test_what_an_artist_changes(scene, texture):
     assert np.allclose(skylight_of_scene(scene).radiance, before.radiance, rtol=1e-6, atol=0)
 
 
+def test_a_slider_at_0_leaves_no_suns(scene, texture):
+    scene.sunsplit.sky["strength"] = 0.0
+    scene.sunsplit.sky.update_tag()
+    found = skylight_of_scene(scene)
+    assert found.suns == ()
+    assert found.radiance.any()
+
+
 def plate_under_suns(scene, folder: Path, normal: np.ndarray) -> np.ndarray:
     """Irradiance, (3,), of a plate that faces a direction, from Cycles, without the world."""
     from mathutils import Vector
@@ -250,6 +258,10 @@ def test_lamps_that_are_not_rendered_are_not_there(scene, texture):
     scene.sunsplit.collection.hide_render = True
     assert skylight_of_scene(scene).suns == ()
     scene.sunsplit.collection.hide_render = first.hide_render = False
+    layer = bpy.context.view_layer.layer_collection.children[scene.sunsplit.collection.name]
+    layer.exclude = True
+    assert skylight_of_scene(scene).suns == ()
+    layer.exclude = False
     bpy.data.objects.remove(first)
     assert len(skylight_of_scene(scene).suns) == 1
     second.data.type = "POINT"
@@ -377,6 +389,17 @@ def test_a_plain_light_beside_the_map(scene, texture, tmp_path):
     added = skylight_of_scene(scene).scalar_irradiance - before.scalar_irradiance
     assert added == pytest.approx(4 * np.pi * np.array([0.2, 0.4, 2]), rel=1e-5)
     assert_the_map_is_what_the_world_shows(scene, tmp_path)
+
+
+def test_another_world_in_place_of_the_converted_one(scene, texture):
+    tree = empty_world(scene)
+    node(tree, "BACKGROUND").inputs["Color"].default_value = 0.1, 0.2, 0.3, 1
+    found = skylight_of_scene(scene)
+    assert found.name == scene.world.name
+    assert found.radiance.reshape(-1, 3).max(axis=0) == pytest.approx([0.1, 0.2, 0.3])
+    assert len(found.suns) == 2
+    scene.world = None
+    assert skylight_of_scene(scene).radiance is None
 
 
 def test_another_image_in_place_of_the_residual(scene, texture, tmp_path):
