@@ -263,7 +263,9 @@ def draw_export(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
         layout.prop(settings, "lux")
     else:
         layout.prop(settings, "up")
-    if settings.format != "usd":  # which has discs
+    if settings.format == "usd":  # which has discs
+        layout.prop(settings, "reader")
+    else:
         layout.prop(settings, "discs")
 
 

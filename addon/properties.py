@@ -262,6 +262,17 @@ EXPORT_CHOICES = {
         soft_min=1.0,
         soft_max=LUMENS_PER_WATT,
     ),
+    "reader": EnumProperty(
+        name="For",
+        description="Who reads the file: Blender's importer takes suns of USD for four times as "
+        "strong and twice as wide as they are",
+        items=[
+            ("usdlux", "All Others", "Whoever follows the specification, UsdLux"),
+            ("blender", "Blender", "Blender's own importer"),
+        ],
+        default="usdlux",
+        options=_FRESH,
+    ),
 }
 """The settings of an export, once: for the scene and as arguments of the operator."""
 

@@ -48,7 +48,8 @@ def made_for_usd(sky: Skylight, settings: ExportSettings) -> Made:
         import pxr.UsdLux  # noqa: F401
     except ImportError as error:
         raise UnusableInput(
-            'USD needs Pixar\'s library: pip install "sunsplit[usd]" (Blender has it).'
+            "USD needs Pixar's library, which Blender of blender.org has: "
+            'pip install "sunsplit[usd]".'
         ) from error
     if not _can_be_referred_to(sky.name):
         raise UnusableInput(

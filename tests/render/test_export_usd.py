@@ -7,23 +7,16 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from mathutils import Vector
 from scipy.spatial.transform import Rotation
 
 from sunsplit.core import ExportSettings, export_conversion, read_skylight, sphere
 from sunsplit.core.export.lookup import look_up
 from sunsplit.core.export.skylight import Skylight
 from sunsplit.core.suns import Sun
-from tests.blender import (
-    add_mesh,
-    camera_towards,
-    diffuse,
-    fresh_scene,
-    plate_mesh,
-    render,
-    to_light,
-)
-from tests.exporting import HEIGHT, MEAN, WIDTH, converted, exported, reference, shadows_agree
+from tests import exports_in_blender
+from tests.blender import camera_towards, render, to_light
+from tests.exporting import MEAN, converted, exported, reference, shadows_agree
+from tests.exports_in_blender import look_at_stage, usd_plate, usd_scene
 from tests.files import noise
 from tests.maps import direction
 from tests.plates import ALBEDO, ORIENTATIONS, irradiance, unit
@@ -33,19 +26,9 @@ TURN = Rotation.from_euler("xyz", (20, -35, 110), degrees=True).as_matrix()
 WIDTHS = np.radians([0.0, 0.01, 0.53, 20.0, 120.0, 180.0])
 
 
-def imported(path: Path) -> bpy.types.Scene:
-    """What Blender makes of a file in a scene that has nothing but a world: without one, it leaves
-    the map out."""
-    scene = fresh_scene()
-    scene.world = bpy.data.worlds.new("World")
-    assert bpy.ops.wm.usd_import(filepath=str(path)) == {"FINISHED"}
-    bpy.context.view_layer.update()
-    return scene
-
-
 def lamps(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """Brightest sun first."""
-    found = [thing for thing in scene.objects if thing.type == "LIGHT"]
+    found = exports_in_blender.lamps(scene)
     return sorted(found, key=lambda lamp: int(lamp.name.removeprefix("Sun_")))
 
 
@@ -84,7 +67,7 @@ def test_the_same_suns(tmp_path, lights, source, which, turn, up):
     made = (read_skylight(lights) if source == "sunrise" else all_widths()).turned(turn)
     settings = ExportSettings("usd", up, reader="blender")
     files = export_conversion(made, tmp_path, settings)
-    found = lamps(imported(getattr(files, which)))
+    found = lamps(usd_scene(getattr(files, which)))
     assert len(found) == len(made.suns) > 0
     for lamp, sun in zip(found, made.suns, strict=True):
         assert lamp.data.type == "SUN"
@@ -97,7 +80,7 @@ def test_what_blender_makes_of_the_specification(tmp_path, lights):
     """Why there is a setting for it. Should a Blender do better one day, this says so."""
     made = read_skylight(lights)
     files = export_conversion(made, tmp_path, ExportSettings("usd"))
-    for lamp, sun in zip(lamps(imported(files.lights)), made.suns, strict=True):
+    for lamp, sun in zip(lamps(usd_scene(files.lights)), made.suns, strict=True):
         assert strength(lamp) == pytest.approx(4 * sun.irradiance, rel=1e-5)
         assert lamp.data.angle == pytest.approx(2 * sun.angular_diameter, rel=1e-5)
 
@@ -125,7 +108,7 @@ def test_the_same_world(tmp_path, which, turn, up):
     pixels = (1.5 + around).astype(np.float32)
     made = Skylight("it's @ name", all_widths().suns, pixels, False, np.eye(3)).turned(turn)
     files = export_conversion(made, tmp_path, ExportSettings("usd", up, reader="blender"))
-    scene = imported(getattr(files, which))
+    scene = usd_scene(getattr(files, which))
     for thing in scene.objects:
         thing.hide_render = thing.type in ("LIGHT", "MESH")
     found = seen_around(scene, tmp_path, 64).reshape(-1, 3)
@@ -142,10 +125,10 @@ def test_the_same_world(tmp_path, which, turn, up):
 def test_no_map_and_no_suns(tmp_path):
     bare = Skylight("bare", all_widths().suns, None, False, np.eye(3))
     files = export_conversion(bare, tmp_path, ExportSettings("usd", reader="blender"))
-    assert len(lamps(imported(files.scene))) == len(WIDTHS)
+    assert len(lamps(usd_scene(files.scene))) == len(WIDTHS)
     sunless = Skylight("sunless", (), noise(), False, np.eye(3))
     files = export_conversion(sunless, tmp_path, ExportSettings("usd", reader="blender"))
-    scene = imported(files.scene)
+    scene = usd_scene(files.scene)
     assert not lamps(scene)
     (texture,) = (n for n in scene.world.node_tree.nodes if n.type == "TEX_ENVIRONMENT")
     assert tuple(texture.image.size) == (32, 16)
@@ -156,11 +139,8 @@ def test_the_scene_that_comes_with_it(tmp_path, sunrise, wanted, up):
     """Its camera, meshes and materials as they are imported."""
     lights = converted(sunrise, tmp_path)
     folder = exported(lights, tmp_path / "usd", "usd", "--up", up, "--reader", "blender")
-    scene = imported(folder / f"{sunrise.stem}.scene.usda")
-    (scene.camera,) = (thing for thing in scene.objects if thing.type == "CAMERA")
-    scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
-    scene.render.resolution_percentage = 100
-    scene.cycles.max_bounces = scene.cycles.diffuse_bounces = 7
+    scene = usd_scene(folder / f"{sunrise.stem}.scene.usda")
+    look_at_stage(scene)
     found = estimate(scene, tmp_path, 128)
     means_agree(wanted.picture, found, tmp_path, MEAN)
     pixels_agree(wanted.picture, found, tmp_path, slack=0.05, outliers=0.02)
@@ -170,11 +150,7 @@ def test_the_scene_that_comes_with_it(tmp_path, sunrise, wanted, up):
 @pytest.mark.parametrize("normal", ORIENTATIONS.values(), ids=ORIENTATIONS.keys())
 def test_a_white_plate(tmp_path, sunrise, lights, normal):
     folder, normal = exported(lights, tmp_path, "usd", "--reader", "blender"), unit(normal)
-    scene = imported(folder / f"{sunrise.stem}.lights.usda")
-    turn = Vector(normal).to_track_quat("Z", "Y").to_matrix().to_4x4()
-    add_mesh(scene, plate_mesh(1), diffuse("White", ALBEDO), turn)
-    camera_towards(scene, -normal, 30, 48).location = Vector(normal) * 2
-    found = render(scene, tmp_path, 196).mean(axis=(0, 1))
+    found = usd_plate(folder, sunrise.stem, normal, 196)
     expected = ALBEDO / np.pi * irradiance(sunrise, normal)
     print(f"ratio - 1 {found / expected - 1}")
     assert found == pytest.approx(expected, rel=MEAN)
