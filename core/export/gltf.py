@@ -1,0 +1,81 @@
+"""glTF 2.0: `KHR_lights_punctual`, and a map beside the file that its `extras` tell of.
+
+Either file holds all else that it needs in itself: it can be moved, dropped into a browser's
+window and checked on its own, and what is inside is small.
+"""
+
+from __future__ import annotations
+
+import os
+from urllib.parse import quote
+
+import numpy as np
+
+from .. import sphere
+from .axes import Y_UP, Axes
+from .emitters import Emitters, Rays, emitters_of
+from .gltf_document import Document, Json, numbers_of, quaternion
+from .gltf_scene import add_stage
+from .made import Made, Names
+from .settings import ExportSettings
+from .skylight import Skylight
+from .stage import STAGE
+
+PUNCTUAL = "KHR_lights_punctual"
+
+LAYOUT = (
+    "Equirectangular, linear Rec.709 radiance. Before it is turned by the rotation, the middle of "
+    "the picture lies at +X, the middle of its left half at -Z, its upper edge at +Y."
+)
+"""Of the map beside a file, in the axes of glTF."""
+
+LUX = "Lux that are written for a unit of irradiance, and of the map's radiance times steradians."
+
+
+def made_for_gltf(sky: Skylight, settings: ExportSettings) -> Made:
+    """Y up, as glTF is by its own rules."""
+    axes = Y_UP
+    emitters = emitters_of(sky, "one ray", settings.discs)
+    names = Names(f"{sky.name}.lights.gltf", f"{sky.name}.scene.gltf", f"{sky.name}.gltf.exr")
+    lights, scene = (_with_light(emitters, axes, settings.lux, names.map) for _ in range(2))
+    add_stage(scene, STAGE, axes)
+    losses = tuple(emitters.losses)
+    return Made(names, lights.text(), scene.text(), emitters.radiance, axes, losses)
+
+
+def _with_light(emitters: Emitters, axes: Axes, lux: float, map_name: str) -> Document:
+    document = Document(emitters.name)
+    document.tell({"sunsplit": _extras(emitters, axes, lux, map_name)})
+    for number, rays in enumerate(emitters.rays, start=1):
+        _add_lamp(document, f"sun {number}", rays, axes, lux)
+    return document
+
+
+def _extras(emitters: Emitters, axes: Axes, lux: float, map_name: str) -> Json:
+    """What no part of glTF has a place for."""
+    extras: Json = {"lux": lux, "lux_means": LUX, "losses": emitters.losses}
+    if emitters.radiance is not None:
+        extras["map"] = {
+            "uri": quote(os.fsencode(map_name)),
+            "layout": LAYOUT,
+            "rotation": quaternion(axes.rotation_of_map(emitters.turn, axes.matrix)),
+            "blend_pixels": not emitters.has_cells,
+        }
+    return extras
+
+
+def _add_lamp(document: Document, name: str, rays: Rays, axes: Axes, lux: float) -> None:
+    """A lamp at the origin that shines along its own -Z."""
+    highest = float(rays.irradiance.max())
+    light = {
+        "name": name,
+        "type": "directional",
+        "intensity": lux * highest,
+        "color": numbers_of(rays.irradiance / (highest or 1.0)),
+        "extras": {"angular_diameter": rays.width, "irradiance": numbers_of(rays.irradiance)},
+    }
+    index = document.add_of_extension(PUNCTUAL, "lights", light)
+    (to_light,) = axes.of(rays.to_light)
+    frame = np.stack([*sphere.tangents(to_light), to_light], axis=-1)
+    place = {"rotation": quaternion(frame), "extensions": {PUNCTUAL: {"light": index}}}
+    document.add_node(name, place)
