@@ -120,13 +120,18 @@ def material(name: str, colour: tuple[float, float, float], **inputs: float) -> 
 
 def diffuse(name: str, albedo: float) -> bpy.types.Material:
     """An exactly Lambertian material."""
+    return material_of_colour(name, (albedo, albedo, albedo))
+
+
+def material_of_colour(name: str, colour: tuple[float, float, float]) -> bpy.types.Material:
+    """The same with an albedo for each channel."""
     made = bpy.data.materials.new(name)
     if bpy.app.version < (5, 0):
         made.use_nodes = True
     tree = made.node_tree
     tree.nodes.clear()
     shader = tree.nodes.new("ShaderNodeBsdfDiffuse")
-    shader.inputs["Color"].default_value = (albedo, albedo, albedo, 1)
+    shader.inputs["Color"].default_value = (*colour, 1)
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(shader.outputs[0], output.inputs[0])
     return made

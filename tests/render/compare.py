@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,7 +29,12 @@ class Estimate:
 
 def estimate(scene, folder: Path, samples: int, seeds: int = 4) -> Estimate:
     """Render with several seeds, so that the renders themselves say how noisy they are."""
-    images = np.stack([render(scene, folder, samples, seed) for seed in range(seeds)])
+    return estimate_of([render(scene, folder, samples, seed) for seed in range(seeds)])
+
+
+def estimate_of(renders: Sequence[np.ndarray]) -> Estimate:
+    """Of at least two renders, (height, width, 3) each, by different seeds."""
+    images, seeds = np.stack(renders), len(renders)
     error = images.std(axis=0, ddof=1) / np.sqrt(seeds)
     return Estimate(images.mean(axis=0), error, images.mean(axis=(1, 2)))
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from mathutils import Matrix, Vector
 
-from sunsplit.core import load, sphere
 from tests.blender import (
     add_mesh,
     ball_mesh,
@@ -22,18 +21,8 @@ from tests.blender import (
     write_map,
 )
 from tests.maps import direction, paint_disc, sky
+from tests.plates import ALBEDO, ORIENTATIONS, irradiance, unit
 from tests.render.compare import MEAN, estimate, means_agree, pixels_agree
-
-ORIENTATIONS = {
-    "up": (0, 0, 1),
-    "down": (0, 0, -1),
-    "east": (1, 0, 0),
-    "north": (0, 1, 0),
-    "west": (-1, 0, 0),
-    "south": (0, -1, 0),
-    "tilted": (1, 1, 1),
-    "tilted away": (-1, 1, -1),
-}
 
 
 @pytest.fixture(scope="module")
@@ -51,26 +40,16 @@ def hdri(request):
     return request.getfixturevalue(request.param)
 
 
-def irradiance(path, normal):
-    """Irradiance of a plate in closed form: the map integrated in float64, (3,)."""
-    environment = load(path)
-    height, width = environment.height, environment.width
-    v, u = (np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width
-    cosine = np.maximum(sphere.to_directions(u[None, :], v[:, None]) @ normal, 0)
-    weight = cosine * sphere.row_solid_angles(width, height)[:, None]
-    return np.einsum("ijk,ij->k", environment.radiance, weight)
-
-
 @pytest.mark.parametrize("normal", ORIENTATIONS.values(), ids=ORIENTATIONS.keys())
 def test_a_white_plate(tmp_path, hdri, normal):
     scene = fresh_scene()
     hdri_world(scene, hdri)
-    normal = np.array(normal) / np.linalg.norm(normal)
+    normal = unit(normal)
     turn = Vector(normal).to_track_quat("Z", "Y").to_matrix().to_4x4()
-    add_mesh(scene, plate_mesh(1), diffuse("White", 0.8), turn)
+    add_mesh(scene, plate_mesh(1), diffuse("White", ALBEDO), turn)
     camera = camera_towards(scene, -normal, 30, 48)
     camera.location = Vector(normal) * 2
-    expected = 0.8 / np.pi * irradiance(hdri, normal)
+    expected = ALBEDO / np.pi * irradiance(hdri, normal)
     plain = estimate(scene, tmp_path, 48)
     # The tolerance is of the mean irradiance. What faces down sees a twentieth of that, and is off
     # by as much as is looked for here with 0.3.
