@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .environment import EnvironmentMap
     from .errors import SunsplitError
     from .export.mitsuba import mitsuba_dict
-    from .export.run import export
+    from .export.run import export_conversion
     from .export.settings import ExportSettings
     from .export.skylight import read_skylight, skylight_of
     from .files.conversion import account_of_files, save
@@ -37,7 +37,7 @@ _HOMES = {
     "account_of_files": "files.conversion",
     "convert": "conversion",
     "convert_library": "library.run",
-    "export": "export.run",
+    "export_conversion": "export.run",
     "load": "files.maps",
     "map_warnings": "suspicions",
     "mitsuba_dict": "export.mitsuba",
@@ -58,7 +58,7 @@ __all__ = [
     "account_of_files",
     "convert",
     "convert_library",
-    "export",
+    "export_conversion",
     "load",
     "map_warnings",
     "mitsuba_dict",

@@ -47,10 +47,10 @@ def add_export(verb: argparse.ArgumentParser) -> None:
 
 
 def run_export(options: argparse.Namespace) -> int:
-    from .export.run import export
+    from .export.run import export_conversion
 
     settings = ExportSettings(options.format, options.up, options.discs, options.lux)
-    files = export(options.conversion, options.output, settings)
+    files = export_conversion(options.conversion, options.output, settings)
     try:
         print(json.dumps(_as_dict(files)) if options.json else "\n".join(_lines(files)))
     except KeyboardInterrupt:

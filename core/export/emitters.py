@@ -120,8 +120,10 @@ def rays_of_disc(to_light: Floats, half_angle: float) -> Floats:
     place = np.concatenate([[0.0], *((np.arange(6 * k) + k % 2 / 2) / (6 * k) for k in rings)])
     # By Archimedes a zone's area is its height: each point lies at half the height of its zone.
     before = np.where(ring > 0, 3 * ring * (ring - 1) + 1, 0)
-    middle = (before + np.maximum(6 * ring, 1) / 2) / len(ring)
-    versine = 2 * np.sin(half_angle / 2) ** 2 * middle
+    middle = np.where(ring > 0, before + 3 * ring, 0)
+    # The first one lies in the middle instead, and the others a trifle further out for it.
+    part = middle / middle.sum() / 2 * len(ring)
+    versine = 2 * np.sin(half_angle / 2) ** 2 * part
     along, aside = (1 - versine)[:, None], np.sqrt(versine * (2 - versine))[:, None]
     turn = 2 * np.pi * place[:, None]
     return along * to_light + aside * (np.cos(turn) * first + np.sin(turn) * second)

@@ -30,7 +30,7 @@ class ExportedFiles:
         return tuple(path for path in (self.lights, self.scene, self.map) if path)
 
 
-def export(
+def export_conversion(
     source: str | Path | Conversion | Skylight, folder: str | Path, settings: ExportSettings
 ) -> ExportedFiles:
     """Write the light of a conversion for another renderer, with a small scene to try it in.
