@@ -23,6 +23,11 @@ from .stage import STAGE
 
 PUNCTUAL = "KHR_lights_punctual"
 
+WIDE_SUN = np.radians(2.5)
+"""Angular diameter from which a sun is painted into the map, as a lamp of glTF has no width. A plate
+that a disc stands edge-on to gets 2 a / (3 pi) of its light, a being its radius, and nothing of such
+a lamp: half a percent at 2.7 degrees."""
+
 LAYOUT = (
     "Equirectangular, linear Rec.709 radiance. Before it is turned by the rotation, the middle of "
     "the picture lies at +X, the middle of its left half at -Z, its upper edge at +Y."
@@ -35,7 +40,7 @@ LUX = "Lux that are written for a unit of irradiance, and of the map's radiance 
 def made_for_gltf(sky: Skylight, settings: ExportSettings) -> Made:
     """Y up, as glTF is by its own rules."""
     axes = Y_UP
-    emitters = emitters_of(sky, "one ray", settings.discs)
+    emitters = emitters_of(sky, "one ray", settings.discs, WIDE_SUN)
     names = Names(f"{sky.name}.lights.gltf", f"{sky.name}.scene.gltf", f"{sky.name}.gltf.exr")
     lights, scene = (_with_light(emitters, axes, settings.lux, names.map) for _ in range(2))
     add_stage(scene, STAGE, axes)
