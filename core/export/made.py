@@ -10,16 +10,7 @@ from numpy.typing import NDArray
 from ..version import version
 from .axes import Axes
 from .emitters import Emitters
-
-
-@dataclass(frozen=True)
-class Names:
-    """Of the files of an export. lights: for one's own scene. scene: one that renders at once. map:
-    what surrounds it."""
-
-    lights: str
-    scene: str
-    map: str
+from .names import Names
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from ..environment import LUMINANCE_WEIGHTS, scalar_irradiance
 from .axes import Y_UP, Axes, chosen_axes
 from .emitters import Emitters, emitters_of
-from .made import Made, Names, heading, number, numbers
+from .made import Made, heading, number, numbers
+from .names import Names, names_of
 from .settings import ExportSettings, Up
 from .skylight import Floats, Skylight
 from .stage import STAGE, Ball, Box, Camera, Stage, Thing
@@ -31,7 +32,7 @@ def made_for_mitsuba(sky: Skylight, settings: ExportSettings) -> Made:
     axes = chosen_axes(settings.up, Y_UP)
     emitters = emitters_of(sky, "many rays", settings.discs)
     losses = tuple(emitters.losses)
-    names = Names(f"{sky.name}.lights.xml", f"{sky.name}.scene.xml", f"{sky.name}.mitsuba.exr")
+    names = names_of("mitsuba", sky.name)
     comment = "\n".join(["", *heading(emitters, axes, losses), ""])
     return Made(
         names,

@@ -6,7 +6,8 @@ import numpy as np
 
 from .axes import Z_UP, Axes, chosen_axes
 from .emitters import Emitters, Rays, emitters_of
-from .made import Made, Names, heading, number, numbers
+from .made import Made, heading, number, numbers
+from .names import Names, names_of
 from .octahedral import octahedral
 from .settings import ExportSettings
 from .skylight import Skylight
@@ -18,7 +19,7 @@ def made_for_pbrt(sky: Skylight, settings: ExportSettings) -> Made:
     axes = chosen_axes(settings.up, Z_UP)
     emitters = emitters_of(sky, "many rays", settings.discs)
     losses = tuple(emitters.losses)
-    names = Names(f"{sky.name}.lights.pbrt", f"{sky.name}.scene.pbrt", f"{sky.name}.pbrt.exr")
+    names = names_of("pbrt", sky.name)
     radiance = None
     if emitters.radiance is not None:
         radiance = octahedral(emitters.radiance, emitters.has_cells)

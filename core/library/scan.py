@@ -9,12 +9,16 @@ from fnmatch import fnmatchcase
 from pathlib import Path, PurePath
 
 from ..errors import UnusableInput
+from ..export.names import ENDINGS as EXPORTS
 from ..files.conversion import ENDINGS
 from ..files.maps import size_of
 from .options import LibraryOptions
 
-OURS = tuple(f".{ENDINGS[kind]}" for kind in ("residual", "preview"))
-"""How images end that a conversion has written, beside its document."""
+OURS = (
+    *((f".{ENDINGS[kind]}", f".{ENDINGS['lights']}") for kind in ("residual", "preview")),
+    *((f".{names.map}", f".{names.lights}") for names in EXPORTS.values()),
+)
+"""How images end that conversions and exports have written, and what then lies beside them."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,7 @@ class Scan:
 
 def scan(library: Path, output: Path, options: LibraryOptions) -> Scan:
     """Find maps in a folder. What lies in the output's folder is none, nor what is hidden, nor
-    what a conversion has written. Raises UnusableInput where there is no such folder."""
+    what a conversion or an export has written. Raises UnusableInput where there is no such folder."""
     if not library.is_dir():
         raise UnusableInput(f"{library} is not a folder: give the folder that holds the maps.")
     unread: list[str] = []
@@ -87,8 +91,10 @@ def _without_ours(names: Sequence[str]) -> list[str]:
 
 
 def _is_ours(name: str, there: set[str]) -> bool:
-    stems = (name.removesuffix(ending) for ending in OURS if name.endswith(ending))
-    return any(f"{stem}.{ENDINGS['lights']}" in there for stem in stems)
+    return any(
+        name.endswith(ending) and name.removesuffix(ending) + beside in there
+        for ending, beside in OURS
+    )
 
 
 def _is_wanted(path: str, options: LibraryOptions) -> bool:

@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sunsplit.core import ExportSettings, convert, export_conversion, load, save
 from sunsplit.core.errors import UnusableInput
 from sunsplit.core.library.options import LibraryOptions
 from sunsplit.core.library.plan import plan
 from sunsplit.core.library.scan import MapFile, Scan, scan
 from sunsplit.core.library.sizes import is_size, name_without_size, size_name, width_of
 from sunsplit.core.settings import BadSetting
-from tests.files import noise, write_exr, write_hdr
+from tests.files import noise, sunny, write_exr, write_hdr
 
 # Sizes in names
 
@@ -104,6 +105,18 @@ def test_what_is_hidden_or_ours_is_no_map(library):
     assert found(library) == ["a.exr", "inner/a.residual.exr"]
     (library / "inner" / "a.lights.json").write_text("{}")
     assert found(library) == ["a.exr"]
+
+
+def test_what_was_exported_is_no_map(library):
+    """Into the library's folder itself, as one does with one map."""
+    write_exr(library / "a.exr", sunny())
+    lights = save(convert(load(library / "a.exr")), library).lights
+    for kind in ("pbrt", "mitsuba"):
+        export_conversion(lights, library, ExportSettings(kind))
+        assert (library / f"a.{kind}.exr").is_file()
+    assert found(library) == ["a.exr"]
+    (library / "a.lights.xml").unlink()
+    assert found(library) == ["a.exr", "a.mitsuba.exr"]
 
 
 def test_output_inside_of_the_library_is_not_searched(library):
