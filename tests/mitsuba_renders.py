@@ -6,14 +6,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pytest
 
+from tests.installed import not_installed
 from tests.plates import ALBEDO
 
 
 def renderer():
     """Mitsuba with its variant that needs no other library; skips where there is none."""
-    mitsuba = pytest.importorskip("mitsuba", reason="the package mitsuba is not installed")
+    try:
+        import mitsuba
+    except ImportError:
+        not_installed("The package mitsuba is not installed.")
     mitsuba.set_variant("scalar_rgb")
     return mitsuba
 

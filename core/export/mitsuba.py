@@ -23,7 +23,6 @@ LAYOUT = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])
 VERSION = "3.5.0"
 """Of the file format: the first that knows `sampling_weight`."""
 
-Number = float | NDArray[np.floating]
 Emitter = dict[str, Any]
 
 

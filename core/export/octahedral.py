@@ -3,9 +3,12 @@ the (Hemi)Sphere using SIMD"): a square whose pixels have all the same solid ang
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cores import usable
 from ..environment import scalar_irradiance
 from .lookup import kept, look_up
 
@@ -14,7 +17,10 @@ Floats = NDArray[np.float64]
 WIDEST = 4096
 """Pixels of the side of the largest map that is made: 50 million looked up four times."""
 
-AT_ONCE = 1 << 20
+LEAST = 64
+"""Of the smallest: pbrt does not blend between pixels."""
+
+AT_ONCE = 1 << 17
 """Directions that are looked up at a time, about."""
 
 
@@ -50,17 +56,20 @@ def octahedral(radiance: NDArray[np.float32], has_cells: bool) -> NDArray[np.flo
     is a third of one on the horizon; each is the mean of places spread evenly over it.
     """
     width = radiance.shape[1]
-    side = min(max(width, 64), WIDEST)
+    side = min(max(width, LEAST), WIDEST)
     parts = 2 * -(-width // side)
     places = (np.arange(side * parts) + 0.5) / (side * parts)
     out = np.empty((side, side, 3))
-    rows = max(AT_ONCE // (side * parts**2), 1)
-    for top in range(0, side, rows):
-        some = places[top * parts : (top + rows) * parts]
+
+    def fill(rows: slice) -> None:
+        some = places[rows.start * parts : rows.stop * parts]
         directions = to_sphere(places[None, :], some[:, None]).reshape(-1, 3)
         light = look_up(radiance, directions, has_cells)
-        light = light.reshape(-1, parts, side, parts, 3)
-        out[top : top + rows] = light.mean(axis=(1, 3))
+        out[rows] = light.reshape(-1, parts, side, parts, 3).mean(axis=(1, 3))
+
+    step = max(AT_ONCE // (side * parts**2), 1)
+    with ThreadPoolExecutor(usable()) as pool:
+        list(pool.map(fill, (slice(k, min(k + step, side)) for k in range(0, side, step))))
     return (out * kept(light_of_octahedral(out), scalar_irradiance(radiance))).astype(np.float32)
 
 
