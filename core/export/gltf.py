@@ -16,7 +16,8 @@ from .axes import Y_UP, Axes
 from .emitters import Emitters, Rays, emitters_of
 from .gltf_document import Document, Json, numbers_of, quaternion
 from .gltf_scene import add_stage
-from .made import Made, Names
+from .made import Made
+from .names import names_of
 from .settings import ExportSettings
 from .skylight import Skylight
 from .stage import STAGE
@@ -24,9 +25,9 @@ from .stage import STAGE
 PUNCTUAL = "KHR_lights_punctual"
 
 WIDE_SUN = np.radians(2.5)
-"""Angular diameter from which a sun is painted into the map, as a lamp of glTF has no width. A plate
-that a disc stands edge-on to gets 2 a / (3 pi) of its light, a being its radius, and nothing of such
-a lamp: half a percent at 2.7 degrees."""
+"""Angular diameter from which a sun is painted into the map, as a lamp of glTF has no width: a
+plate that is edge-on to a disc gets 2 a / (3 pi) of its light, where a is its radius, and nothing of
+such a lamp. That is half a percent at 2.7 degrees."""
 
 LAYOUT = (
     "Equirectangular, linear Rec.709 radiance. Before it is turned by the rotation, the middle of "
@@ -41,7 +42,7 @@ def made_for_gltf(sky: Skylight, settings: ExportSettings) -> Made:
     """Y up, as glTF is by its own rules."""
     axes = Y_UP
     emitters = emitters_of(sky, "one ray", settings.discs, WIDE_SUN)
-    names = Names(f"{sky.name}.lights.gltf", f"{sky.name}.scene.gltf", f"{sky.name}.gltf.exr")
+    names = names_of("gltf", sky.name)
     lights, scene = (_with_light(emitters, axes, settings.lux, names.map) for _ in range(2))
     add_stage(scene, STAGE, axes)
     losses = tuple(emitters.losses)
