@@ -1,4 +1,5 @@
-"""glTF 2.0: `KHR_lights_punctual`, and a map beside the file that its `extras` tell of.
+"""glTF 2.0: `KHR_lights_punctual` and `EXT_lights_image_based`, and for those who do not know the
+latter, or want more of it, a map beside the file that its `extras` tell of.
 
 Either file holds all else that it needs in itself: it can be moved, dropped into a browser's
 window and checked on its own, and what is inside is small.
@@ -15,6 +16,7 @@ from .. import sphere
 from .axes import Y_UP, Axes
 from .emitters import Emitters, Rays, emitters_of
 from .gltf_document import Document, Json, numbers_of, quaternion
+from .gltf_images import ImageBasedLight, add_image_based_light, image_based_light
 from .gltf_scene import add_stage
 from .made import Made
 from .names import names_of
@@ -26,8 +28,8 @@ PUNCTUAL = "KHR_lights_punctual"
 
 WIDE_SUN = np.radians(2.5)
 """Angular diameter from which a sun is painted into the map, as a lamp of glTF has no width: a
-plate that is edge-on to a disc gets 2 a / (3 pi) of its light, where a is its radius, and nothing of
-such a lamp. That is half a percent at 2.7 degrees."""
+plate that is edge-on to a disc of radius a gets 2 a / (3 pi) of its light, and nothing of such a
+lamp. That is half a percent at 2.7 degrees."""
 
 LAYOUT = (
     "Equirectangular, linear Rec.709 radiance. Before it is turned by the rotation, the middle of "
@@ -43,17 +45,26 @@ def made_for_gltf(sky: Skylight, settings: ExportSettings) -> Made:
     axes = Y_UP
     emitters = emitters_of(sky, "one ray", settings.discs, WIDE_SUN)
     names = names_of("gltf", sky.name)
-    lights, scene = (_with_light(emitters, axes, settings.lux, names.map) for _ in range(2))
+    light = image_based_light(emitters, axes, settings.lux)
+    lights, scene = (_with_light(emitters, axes, settings, names.map, light) for _ in range(2))
     add_stage(scene, STAGE, axes)
     losses = tuple(emitters.losses)
     return Made(names, lights.text(), scene.text(), emitters.radiance, axes, losses)
 
 
-def _with_light(emitters: Emitters, axes: Axes, lux: float, map_name: str) -> Document:
+def _with_light(
+    emitters: Emitters,
+    axes: Axes,
+    settings: ExportSettings,
+    map_name: str,
+    light: ImageBasedLight | None,
+) -> Document:
     document = Document(emitters.name)
-    document.tell({"sunsplit": _extras(emitters, axes, lux, map_name)})
+    document.tell({"sunsplit": _extras(emitters, axes, settings.lux, map_name)})
     for number, rays in enumerate(emitters.rays, start=1):
-        _add_lamp(document, f"sun {number}", rays, axes, lux)
+        _add_lamp(document, f"sun {number}", rays, axes, settings.lux)
+    if light:
+        add_image_based_light(document, light)
     return document
 
 

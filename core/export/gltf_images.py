@@ -1,0 +1,106 @@
+"""`EXT_lights_image_based`: a map as nine harmonics of its irradiance, and as a cube of pictures
+whose levels are what rougher and rougher surfaces mirror.
+
+As Babylon.js reads it, whose makers wrote the extension: where its text leaves something open, or
+Babylon.js does otherwise, this follows Babylon.js.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..environment import whole_part
+from ..pixels import HeldPixels
+from ..reduction import narrowed
+from .axes import Axes
+from .cube import averaged, cube_directions
+from .emitters import Emitters
+from .glossy import blurred
+from .gltf_document import Document, data_uri
+from .harmonics import irradiance_harmonics
+from .lookup import look_up, narrower
+from .rgbd import HIGHEST, packed, png
+
+Floats = NDArray[np.float64]
+
+EXTENSION = "EXT_lights_image_based"
+
+SIDES = (256, 128, 64, 32, 16)
+"""Pixels of the faces of each level; the extension's text proposes to stop at 16."""
+
+WIDEST = 1024
+"""Pixels of the map, about, that a cube of such faces is made of: its own are no smaller."""
+
+TO_CUBE = np.diag([-1.0, 1.0, 1.0])
+"""From glTF's axes to those of the cube and of the harmonics. Babylon.js is left-handed and mirrors
+in X what it loads; a cube it takes as it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class ImageBasedLight:
+    """intensity: what coefficients and pictures are to be multiplied by. coefficients: (9, 3).
+    levels: bytes of RGBD, (6, side, side, 4) each."""
+
+    intensity: float
+    coefficients: Floats
+    levels: tuple[NDArray[np.uint8], ...]
+
+
+def image_based_light(emitters: Emitters, axes: Axes, lux: float) -> ImageBasedLight | None:
+    """The map of a sky, turned as the sky is, or None where there is none."""
+    if emitters.radiance is None:
+        return None
+    radiance = narrowed(
+        HeldPixels.of(emitters.radiance), whole_part(emitters.radiance.shape[1], WIDEST)
+    )
+    to_cube = TO_CUBE @ axes.matrix @ emitters.turn
+    levels = [_mirror(radiance, to_cube, emitters.has_cells)]
+    levels += [_level(radiance, to_cube, level) for level in range(1, len(SIDES))]
+    # Pictures end at HIGHEST. So far the brightest pixel is stretched, or shrunk.
+    scale = max(float(level.max()) for level in levels) / HIGHEST or 1.0
+    coefficients = irradiance_harmonics(radiance, to_cube) / scale
+    return ImageBasedLight(lux * scale, coefficients, tuple(packed(k / scale) for k in levels))
+
+
+def roughness_of_level(level: int) -> float:
+    """The alpha of GGX, a roughness squared, that Babylon.js looks a level up for.
+
+    It takes the level in which a pixel is as wide as the blur, and of these numbers makes ones
+    that end with the last level (the text of the extension would have equal steps of roughness).
+    """
+    return float(SIDES[0]) ** (level / (len(SIDES) - 1) - 1)
+
+
+def _mirror(radiance: NDArray[np.float32], to_cube: Floats, has_cells: bool) -> Floats:
+    """What a perfect mirror shows, (6, side, side, 3)."""
+    directions = cube_directions(2 * SIDES[0])
+    light = look_up(radiance, directions.reshape(-1, 3) @ to_cube, has_cells)
+    return averaged(light.reshape(directions.shape), 2)
+
+
+def _level(radiance: NDArray[np.float32], to_cube: Floats, level: int) -> Floats:
+    """What a rougher surface mirrors, (6, side, side, 3)."""
+    mirrored = blurred(narrower(radiance, 4 * SIDES[level]), roughness_of_level(level))
+    directions = cube_directions(SIDES[level])
+    light = look_up(mirrored, directions.reshape(-1, 3) @ to_cube, has_cells=False)
+    return light.reshape(directions.shape)
+
+
+def add_image_based_light(document: Document, light: ImageBasedLight) -> None:
+    """The light, and that the scene has it."""
+    images = []
+    for level in light.levels:
+        faces = [{"uri": data_uri("image/png", png(face))} for face in level]
+        images.append([document.add("images", face) for face in faces])
+    part = {
+        # Babylon.js has no default for it.
+        "intensity": light.intensity,
+        "irradianceCoefficients": light.coefficients.tolist(),
+        "specularImageSize": SIDES[0],
+        "specularImages": images,
+    }
+    index = document.add_of_extension(EXTENSION, "lights", part)
+    document.extend_scene(EXTENSION, {"light": index})
