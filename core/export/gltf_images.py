@@ -39,30 +39,49 @@ TO_CUBE = np.diag([-1.0, 1.0, 1.0])
 in X what it loads; a cube it takes as it is."""
 
 
+DIM = 0.02
+"""A mean that 8 bits say less well than one nearer to 1."""
+
+
 @dataclass(frozen=True, eq=False)
 class ImageBasedLight:
     """intensity: what coefficients and pictures are to be multiplied by. coefficients: (9, 3).
-    levels: bytes of RGBD, (6, side, side, 4) each."""
+    pictures: of each level and its faces, PNG files."""
 
     intensity: float
     coefficients: Floats
-    levels: tuple[NDArray[np.uint8], ...]
+    pictures: tuple[tuple[bytes, ...], ...]
 
 
 def image_based_light(emitters: Emitters, axes: Axes, lux: float) -> ImageBasedLight | None:
     """The map of a sky, turned as the sky is, or None where there is none."""
     if emitters.radiance is None:
         return None
-    radiance = narrowed(
-        HeldPixels.of(emitters.radiance), whole_part(emitters.radiance.shape[1], WIDEST)
-    )
+    width = whole_part(emitters.radiance.shape[1], WIDEST)
+    radiance = narrowed(HeldPixels.of(emitters.radiance), width)
     to_cube = TO_CUBE @ axes.matrix @ emitters.turn
     levels = [_mirror(radiance, to_cube, emitters.has_cells)]
     levels += [_level(radiance, to_cube, level) for level in range(1, len(SIDES))]
-    # Pictures end at HIGHEST. So far the brightest pixel is stretched, or shrunk.
-    scale = max(float(level.max()) for level in levels) / HIGHEST or 1.0
-    coefficients = irradiance_harmonics(radiance, to_cube) / scale
-    return ImageBasedLight(lux * scale, coefficients, tuple(packed(k / scale) for k in levels))
+    highest = lux * max(float(level.max()) for level in levels)
+    intensity = _intensity(lux * float(levels[0].mean()), highest)
+    scale = lux / intensity
+    return ImageBasedLight(
+        intensity,
+        irradiance_harmonics(radiance, to_cube) * scale,
+        tuple(tuple(_picture(face * scale) for face in level) for level in levels),
+    )
+
+
+def _intensity(mean: float, highest: float) -> float:
+    """1 where pictures can say all in lux, as Babylon.js 9 multiplies irradiance by it twice."""
+    if mean >= DIM and highest <= HIGHEST:
+        return 1.0
+    return max(mean, highest / HIGHEST) or 1.0
+
+
+def _picture(face: Floats) -> bytes:
+    """Of a face, (side, side, 3), as Babylon.js takes it: its lowest row first."""
+    return png(packed(face[::-1]))
 
 
 def roughness_of_level(level: int) -> float:
@@ -92,8 +111,8 @@ def _level(radiance: NDArray[np.float32], to_cube: Floats, level: int) -> Floats
 def add_image_based_light(document: Document, light: ImageBasedLight) -> None:
     """The light, and that the scene has it."""
     images = []
-    for level in light.levels:
-        faces = [{"uri": data_uri("image/png", png(face))} for face in level]
+    for level in light.pictures:
+        faces = [{"uri": data_uri("image/png", picture)} for picture in level]
         images.append([document.add("images", face) for face in faces])
     part = {
         # Babylon.js has no default for it.
