@@ -44,7 +44,8 @@ class Scan:
 
 def scan(library: Path, output: Path, options: LibraryOptions) -> Scan:
     """Find maps in a folder. What lies in the output's folder is none, nor what is hidden, nor
-    what a conversion or an export has written. Raises UnusableInput where there is no such folder."""
+    what a conversion or an export has written. Raises UnusableInput where there is no such
+    folder."""
     if not library.is_dir():
         raise UnusableInput(f"{library} is not a folder: give the folder that holds the maps.")
     unread: list[str] = []
