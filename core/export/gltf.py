@@ -39,46 +39,47 @@ LAYOUT = (
 
 LUX = "Lux that are written for a unit of irradiance, and of the map's radiance times steradians."
 
+MAP_IN_VIEWERS = (
+    "Viewers show the map by EXT_lights_image_based, coarsely and without its shadows, or not at "
+    "all: other programs need the file beside."
+)
+
 
 def made_for_gltf(sky: Skylight, settings: ExportSettings) -> Made:
     """Y up, as glTF is by its own rules."""
-    axes = Y_UP
+    axes, lux = Y_UP, settings.lux
     emitters = emitters_of(sky, "one ray", settings.discs, WIDE_SUN)
     names = names_of("gltf", sky.name)
-    light = image_based_light(emitters, axes, settings.lux)
-    lights, scene = (_with_light(emitters, axes, settings, names.map, light) for _ in range(2))
+    losses = emitters.losses + ([MAP_IN_VIEWERS] if emitters.radiance is not None else [])
+    extras = {"lux": lux, "lux_means": LUX, "losses": losses}
+    if emitters.radiance is not None:
+        extras["map"] = _about_map(emitters, axes, names.map)
+    light = image_based_light(emitters, axes, lux)
+    lights, scene = (_with_light(emitters, axes, lux, extras, light) for _ in range(2))
     add_stage(scene, STAGE, axes)
-    losses = tuple(emitters.losses)
-    return Made(names, lights.text(), scene.text(), emitters.radiance, axes, losses)
+    return Made(names, lights.text(), scene.text(), emitters.radiance, axes, tuple(losses))
+
+
+def _about_map(emitters: Emitters, axes: Axes, name: str) -> Json:
+    """What no part of glTF has a place for. name: of the file."""
+    return {
+        "uri": quote(os.fsencode(name)),
+        "layout": LAYOUT,
+        "rotation": quaternion(axes.rotation_of_map(emitters.turn, axes.matrix)),
+        "blend_pixels": not emitters.has_cells,
+    }
 
 
 def _with_light(
-    emitters: Emitters,
-    axes: Axes,
-    settings: ExportSettings,
-    map_name: str,
-    light: ImageBasedLight | None,
+    emitters: Emitters, axes: Axes, lux: float, extras: Json, light: ImageBasedLight | None
 ) -> Document:
     document = Document(emitters.name)
-    document.tell({"sunsplit": _extras(emitters, axes, settings.lux, map_name)})
+    document.tell({"sunsplit": extras})
     for number, rays in enumerate(emitters.rays, start=1):
-        _add_lamp(document, f"sun {number}", rays, axes, settings.lux)
+        _add_lamp(document, f"sun {number}", rays, axes, lux)
     if light:
         add_image_based_light(document, light)
     return document
-
-
-def _extras(emitters: Emitters, axes: Axes, lux: float, map_name: str) -> Json:
-    """What no part of glTF has a place for."""
-    extras: Json = {"lux": lux, "lux_means": LUX, "losses": emitters.losses}
-    if emitters.radiance is not None:
-        extras["map"] = {
-            "uri": quote(os.fsencode(map_name)),
-            "layout": LAYOUT,
-            "rotation": quaternion(axes.rotation_of_map(emitters.turn, axes.matrix)),
-            "blend_pixels": not emitters.has_cells,
-        }
-    return extras
 
 
 def _add_lamp(document: Document, name: str, rays: Rays, axes: Axes, lux: float) -> None:

@@ -32,12 +32,12 @@ SIDES = (256, 128, 64, 32, 16)
 """Pixels of the faces of each level; the extension's text proposes to stop at 16."""
 
 WIDEST = 1024
-"""Pixels of the map, about, that a cube of such faces is made of: its own are no smaller."""
+"""Pixels of the width of the map that a cube of such faces is made of: its own are no smaller."""
 
 TO_CUBE = np.diag([-1.0, 1.0, 1.0])
 """From glTF's axes to those of the cube and of the harmonics. Babylon.js is left-handed and mirrors
-in X what it loads; a cube it takes as it is."""
-
+in X what it loads; a cube it takes as it is. (Its right-handed scenes have the same cube half a
+turn about Y from there.)"""
 
 DIM = 0.02
 """A mean that 8 bits say less well than one nearer to 1."""
@@ -57,8 +57,8 @@ def image_based_light(emitters: Emitters, axes: Axes, lux: float) -> ImageBasedL
     """The map of a sky, turned as the sky is, or None where there is none."""
     if emitters.radiance is None:
         return None
-    width = whole_part(emitters.radiance.shape[1], WIDEST)
-    radiance = narrowed(HeldPixels.of(emitters.radiance), width)
+    part = whole_part(emitters.radiance.shape[1], WIDEST)
+    radiance = narrower(narrowed(HeldPixels.of(emitters.radiance), part), WIDEST)
     to_cube = TO_CUBE @ axes.matrix @ emitters.turn
     levels = [_mirror(radiance, to_cube, emitters.has_cells)]
     levels += [_level(radiance, to_cube, level) for level in range(1, len(SIDES))]
@@ -84,7 +84,7 @@ def _picture(face: Floats) -> bytes:
     return png(packed(face[::-1]))
 
 
-def roughness_of_level(level: int) -> float:
+def _roughness(level: int) -> float:
     """The alpha of GGX, a roughness squared, that Babylon.js looks a level up for.
 
     It takes the level in which a pixel is as wide as the blur, and of these numbers makes ones
@@ -93,16 +93,16 @@ def roughness_of_level(level: int) -> float:
     return float(SIDES[0]) ** (level / (len(SIDES) - 1) - 1)
 
 
-def _mirror(radiance: NDArray[np.float32], to_cube: Floats, has_cells: bool) -> Floats:
+def _mirror(radiance: Floats, to_cube: Floats, has_cells: bool) -> Floats:
     """What a perfect mirror shows, (6, side, side, 3)."""
     directions = cube_directions(2 * SIDES[0])
     light = look_up(radiance, directions.reshape(-1, 3) @ to_cube, has_cells)
     return averaged(light.reshape(directions.shape), 2)
 
 
-def _level(radiance: NDArray[np.float32], to_cube: Floats, level: int) -> Floats:
+def _level(radiance: Floats, to_cube: Floats, level: int) -> Floats:
     """What a rougher surface mirrors, (6, side, side, 3)."""
-    mirrored = blurred(narrower(radiance, 4 * SIDES[level]), roughness_of_level(level))
+    mirrored = blurred(narrower(radiance, 4 * SIDES[level]), _roughness(level))
     directions = cube_directions(SIDES[level])
     light = look_up(mirrored, directions.reshape(-1, 3) @ to_cube, has_cells=False)
     return light.reshape(directions.shape)
