@@ -3,64 +3,27 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
-from urllib.parse import unquote
 
-import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix, Quaternion, Vector
+from scipy.spatial.transform import Rotation
 
 from sunsplit.core import ExportSettings, export_conversion, read_skylight
 from sunsplit.core.export.stage import STAGE
-from tests.blender import (
-    add_mapping,
-    add_mesh,
-    camera_towards,
-    diffuse,
-    fresh_scene,
-    hdri_world,
-    plate_mesh,
-    render,
-    to_light,
+from tests.blender import to_light
+from tests.exporting import MEAN, converted, exported, reference, shadows_agree
+from tests.exports_in_blender import (
+    add_gltf_widths,
+    add_gltf_world,
+    gltf_scene,
+    lamps,
+    look_at_stage,
+    plate_in,
 )
-from tests.exporting import HEIGHT, MEAN, WIDTH, converted, exported, reference, shadows_agree
 from tests.plates import ALBEDO, ORIENTATIONS, irradiance, unit
 from tests.render.compare import estimate, means_agree
 
-TURN = np.array(Matrix.Rotation(0.7, 3, (1, 2, -3)))
-
-
-def imported(path: Path, mode: str = "SPEC") -> bpy.types.Scene:
-    """What Blender's importer makes of a file, and nothing else."""
-    scene = fresh_scene()
-    bpy.ops.preferences.addon_enable(module="io_scene_gltf2")
-    bpy.ops.import_scene.gltf(filepath=str(path), export_import_convert_lighting_mode=mode)
-    bpy.context.view_layer.update()
-    return scene
-
-
-def lamps(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    return [thing for thing in scene.objects if thing.type == "LIGHT"]
-
-
-def add_world(scene: bpy.types.Scene, folder: Path) -> None:
-    """The map beside a file, as the file's extras say, which the importer keeps with the scene.
-
-    The importer turns Y up into Z up, where an environment texture lies as they say of the map.
-    """
-    told = scene["sunsplit"]["map"]
-    mapping = add_mapping(hdri_world(scene, folder / unquote(told["uri"])))
-    x, y, z, w = told["rotation"]
-    # The node turns directions of the scene into those of the picture.
-    back = Quaternion((w, x, -z, y)).inverted()
-    mapping.inputs["Rotation"].default_value = back.to_euler()
-
-
-def add_width(scene: bpy.types.Scene) -> None:
-    """The importer leaves every sun the width of a new lamp; what it has is kept with it."""
-    for lamp in lamps(scene):
-        lamp.data.angle = lamp.data["angular_diameter"]
+TURN = Rotation.from_euler("xyz", (20, -35, 110), degrees=True).as_matrix()
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +38,7 @@ def lights(sunrise, tmp_path_factory):
 def test_lamps_are_the_suns(tmp_path, lights, mode, lux, kind):
     sky = read_skylight(lights).turned(TURN)
     files = export_conversion(sky, tmp_path, ExportSettings("gltf", discs="lights", lux=lux))
-    found = lamps(imported(getattr(files, kind), mode))
+    found = lamps(gltf_scene(getattr(files, kind), mode))
     assert len(found) == len(sky.suns) > 2
     for lamp, sun in zip(found, sky.suns, strict=True):
         assert lamp.data.type == "SUN"
@@ -86,7 +49,7 @@ def test_lamps_are_the_suns(tmp_path, lights, mode, lux, kind):
 
 
 def test_the_camera_is_the_stages(tmp_path, lights):
-    scene = imported(export_conversion(lights, tmp_path, ExportSettings("gltf")).scene)
+    scene = gltf_scene(export_conversion(lights, tmp_path, ExportSettings("gltf")).scene)
     (camera,) = (thing for thing in scene.objects if thing.type == "CAMERA")
     place = np.array(camera.matrix_world)
     assert place[:3, 3] == pytest.approx(STAGE.camera.place, abs=1e-5)
@@ -97,9 +60,9 @@ def test_the_camera_is_the_stages(tmp_path, lights):
 
 
 def test_things_are_the_stages(tmp_path, lights):
-    scene = imported(export_conversion(lights, tmp_path, ExportSettings("gltf")).scene)
+    scene = gltf_scene(export_conversion(lights, tmp_path, ExportSettings("gltf")).scene)
     ball = scene.objects["ball"]
-    corners = [ball.matrix_world @ Vector(corner) for corner in ball.bound_box]
+    corners = [np.array(ball.matrix_world)[:3] @ (*corner, 1) for corner in ball.bound_box]
     assert np.min(corners, axis=0) == pytest.approx([-0.8, -1.8, 0], abs=1e-5)
     assert np.max(corners, axis=0) == pytest.approx([0.8, -0.2, 1.6], abs=1e-5)
 
@@ -112,12 +75,10 @@ def wanted(sunrise, tmp_path_factory):
 @pytest.mark.parametrize("options", [(), ("--discs", "map")])
 def test_the_scene_that_comes_with_it(tmp_path, sunrise, wanted, options):
     folder = exported(converted(sunrise, tmp_path), tmp_path, "gltf", *options)
-    scene = imported(folder / f"{sunrise.stem}.scene.gltf")
-    scene.camera = scene.objects["camera"]
-    scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
-    scene.cycles.max_bounces = scene.cycles.diffuse_bounces = 7
-    add_world(scene, folder)
-    add_width(scene)
+    scene = gltf_scene(folder / f"{sunrise.stem}.scene.gltf")
+    look_at_stage(scene)
+    add_gltf_world(scene, folder)
+    add_gltf_widths(scene)
     found = estimate(scene, tmp_path, samples=48)
     means_agree(wanted.picture, found, tmp_path, MEAN)
     shadows_agree(wanted, found.mean)
@@ -127,26 +88,19 @@ def test_the_scene_that_comes_with_it(tmp_path, sunrise, wanted, options):
 def test_plates(tmp_path, sunrise, lights, turned):
     turn = TURN if turned else np.eye(3)
     files = export_conversion(read_skylight(lights).turned(turn), tmp_path, ExportSettings("gltf"))
-    scene = imported(files.lights)
-    add_world(scene, tmp_path)
+    scene = gltf_scene(files.lights)
+    add_gltf_world(scene, tmp_path)
     for name, normal in ORIENTATIONS.items():
         normal = unit(normal)
-        towards = Vector((turn @ normal).tolist())
-        facing = towards.to_track_quat("Z", "Y").to_matrix().to_4x4()
-        plate = add_mesh(scene, plate_mesh(1), diffuse("White", ALBEDO), facing)
-        plate.location = -towards
-        camera = camera_towards(scene, -np.array(towards), 10, 16)
-        seen = render(scene, tmp_path, samples=256).mean(axis=(0, 1))
+        seen = plate_in(scene, tmp_path, turn @ normal, samples=256)
         ratio = seen * np.pi / ALBEDO / irradiance(sunrise, normal) - 1
         print(name, ratio)
         assert np.abs(ratio).max() < MEAN, name
-        for thing in (plate, camera):
-            bpy.data.objects.remove(thing)
 
 
 def test_extras_are_plain_json(tmp_path, lights):
     """What scripts read without Blender."""
     files = export_conversion(lights, tmp_path, ExportSettings("gltf"))
     (scene,) = json.loads(files.lights.read_text(encoding="utf-8"))["scenes"]
-    told = imported(files.lights)["sunsplit"].to_dict()
+    told = gltf_scene(files.lights)["sunsplit"].to_dict()
     assert told == scene["extras"]["sunsplit"]
