@@ -11,12 +11,14 @@ CLASSES = (
     properties.SunsplitLamp,
     properties.SunsplitBeforePasses,
     properties.SunsplitBeforeEevee,
+    properties.SunsplitExport,
     properties.SunsplitSettings,
     operators.SUNSPLIT_OT_convert,
     operators.SUNSPLIT_OT_restore,
     operators.SUNSPLIT_OT_complete_sky,
     operators.SUNSPLIT_OT_reset_factors,
     operators.SUNSPLIT_OT_select_suns,
+    operators.SUNSPLIT_OT_export,
     presets.SUNSPLIT_OT_add_preset,
     panel.SUNSPLIT_PT_presets,
     overlay.SUNSPLIT_OT_pick_sun,
@@ -24,10 +26,12 @@ CLASSES = (
     panel.SUNSPLIT_PT_suns,
     panel.SUNSPLIT_PT_settings,
     panel.SUNSPLIT_PT_advanced,
+    panel.SUNSPLIT_PT_export,
     panel.SUNSPLIT_PT_world,
     panel.SUNSPLIT_PT_world_suns,
     panel.SUNSPLIT_PT_world_settings,
     panel.SUNSPLIT_PT_world_advanced,
+    panel.SUNSPLIT_PT_world_export,
 )
 
 

@@ -17,7 +17,7 @@ from ..core.environment import EnvironmentMap, environment_from_strips
 from ..core.errors import CannotWrite, UnusableInput
 from ..core.files import exr
 from ..core.files.maps import load
-from ..core.pixels import HeldPixels
+from ..core.pixels import HeldPixels, Pixels
 from ..core.progress import Progress
 from ..core.residual import LevelledPixels
 from .known import known_file, known_map
@@ -33,6 +33,9 @@ LINEAR_SPACES = ("Linear ", "Non-Color", "ACEScg", "ACES2065-1", "scene_linear")
 AS_IT_IS = "Linear Rec.709"
 """The colour space whose numbers are what a file holds, and what the core takes them for."""
 
+EXR = b"\x76\x2f\x31\x01"
+"""How an EXR file begins."""
+
 READ = 0.3
 """Of the time of a conversion, about, for reading."""
 
@@ -44,8 +47,7 @@ def read_image(image: bpy.types.Image) -> Steps[EnvironmentMap]:
 
     Raises UnusableInput.
     """
-    if image.source in ("SEQUENCE", "MOVIE", "TILED"):
-        raise UnusableInput(f'"{image.name}" is a {image.source.lower()}: use a single image.')
+    _check_single(image)
     name, path = image.name, _file_of(image)
     if path is not None:
         found = yield Apart(lambda listen, _: _of_file(path, name, listen), 0.0, READ)
@@ -58,6 +60,42 @@ def read_image(image: bpy.types.Image) -> Steps[EnvironmentMap]:
             lambda *_: known_map(pixels, name, lambda: _from_pixels(pixels, shape, name)), 0.0, READ
         )
     )
+
+
+def _check_single(image: bpy.types.Image) -> None:
+    if image.source in ("SEQUENCE", "MOVIE", "TILED"):
+        raise UnusableInput(f'"{image.name}" is a {image.source.lower()}: use a single image.')
+
+
+def unrepaired_pixels(image: bpy.types.Image, folder: Path) -> Pixels:
+    """All pixels that a renderer sees of an image, as they are; Blender need not load those of an
+    EXR file, packed or not. folder: for a file that the pixels may be read from as long as it is
+    there. Raises UnusableInput, CannotWrite."""
+    _check_single(image)
+    path = _file_of(image) or _unpacked(image, folder)
+    if path is not None and path.suffix.lower() == ".exr" and exr.is_plain(path):
+        return exr.read(path)[0]
+    pixels = _pixels_of(image)
+    return HeldPixels.of(_colour_of(pixels, (image.size[1], image.size[0], image.channels)))
+
+
+def _unpacked(image: bpy.types.Image, folder: Path) -> Path | None:
+    """A packed EXR whose pixels are the image's as they are, as a file; None for all else."""
+    if image.source != "FILE" or not image.packed_file or image.is_dirty:
+        return None
+    if image.colorspace_settings.name != working_space():
+        return None
+    data = image.packed_file.data
+    if not data.startswith(EXR):
+        return None
+    path = folder / "unpacked.exr"
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise CannotWrite(
+            f'Cannot write "{image.name}" into a temporary folder: {error.strerror}.'
+        ) from error
+    return path
 
 
 def _of_file(path: Path, name: str, progress: Progress) -> EnvironmentMap | None:
@@ -76,9 +114,14 @@ def _of_file(path: Path, name: str, progress: Progress) -> EnvironmentMap | None
 def _from_pixels(
     pixels: NDArray[np.float32], shape: tuple[int, int, int], name: str
 ) -> EnvironmentMap:
+    held = HeldPixels.of(_colour_of(pixels, shape))
+    return environment_from_strips(held, Path(name).stem, name)
+
+
+def _colour_of(pixels: NDArray[np.float32], shape: tuple[int, int, int]) -> NDArray[np.float32]:
+    """Rows downwards, three channels, of numbers in Blender's order."""
     pixels = pixels.reshape(shape)[::-1]
-    colour = pixels[..., :3] if shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
-    return environment_from_strips(HeldPixels.of(colour), Path(name).stem, name)
+    return pixels[..., :3] if shape[2] >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
 
 
 def _file_of(image: bpy.types.Image) -> Path | None:

@@ -27,6 +27,9 @@ as a sun shines from everywhere."""
 LEAST_WHOLE = 0.01
 """Of all light: below, a lamp's name says tenths of a percent."""
 
+LEAST = 1e-9
+"""What a factor of 0 is to a lamp, as the logarithm of 0 is no exposure."""
+
 WARMER = 2.15
 """What one step of warmth divides a colour temperature by: 6500 to 3000 K."""
 
@@ -102,7 +105,7 @@ def _follow_factors(data: bpy.types.Light, sky: bpy.types.Object, light: WorldLi
     if light.strength is not None:
         now = float(constant(light.strength)[0])
         strength = f"{strength}*({formula.input(light.strength)})/{now!r}"
-    formula.drive(data, "exposure", -1, f"log(max({strength},1e-9),2)", 0.0)
+    formula.drive(data, "exposure", -1, f"log(max({strength},{LEAST}),2)", 0.0)
     warmth = formula.property("OBJECT", sky, f'["{WARMTH.name}"]')
     formula.drive(data, "use_temperature", -1, f"{warmth} != 0", False)
     formula.drive(data, "temperature", -1, f"6500*pow({WARMER},-{warmth})", 6500.0)

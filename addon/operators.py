@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty
+from bpy.props import EnumProperty, FloatProperty, StringProperty
 
+from ..core.errors import SunsplitError
+from .exported import remember
 from .modal import InSteps
-from .properties import CHOICES
+from .properties import CHOICES, EXPORT_CHOICES
 from .skies import lacks_suns
 from .steps import Steps
 
@@ -170,6 +175,104 @@ class SUNSPLIT_OT_select_suns(bpy.types.Operator):
         select_lamps(context, found)
         self.report({"INFO"}, f"{len(found)} selected")
         return {"FINISHED"} if found else {"CANCELLED"}
+
+
+class SUNSPLIT_OT_export(bpy.types.Operator):
+    """Write suns and world, as they are now, as files of another renderer, with a small scene"""
+
+    bl_idname = "sunsplit.export"
+    bl_label = "Export Light"
+    bl_options = {"REGISTER"}  # noqa: RUF012 - nothing changes: there is nothing to undo
+
+    __annotations__ = EXPORT_CHOICES | {
+        "directory": StringProperty(
+            name="Folder",
+            description="Where the files are written; nothing: beside the .blend file",
+            subtype="DIR_PATH",
+            options={"SKIP_SAVE", "HIDDEN"},
+        ),
+        "filename": StringProperty(
+            name="Name",
+            description="What the names of the files begin with; nothing: the name of the map",
+            subtype="FILE_NAME",
+            options={"SKIP_SAVE", "HIDDEN"},
+        ),
+    }
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _is_converted(cls, context)
+
+    _in_browser = False
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        from .exporting import map_name
+
+        for name, value in self._chosen(context.scene).items():
+            setattr(self, name, value)
+        self._in_browser = True
+        if not self.directory and bpy.data.filepath:
+            self.directory = bpy.path.abspath("//")
+        self.filename = self.filename or map_name(context.scene)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        from ..core.export.settings import ExportSettings
+        from .exporting import export_scene
+
+        scene, chosen = context.scene, self._chosen(context.scene)
+        if chosen["format"] == "gltf" and (self._in_browser or not self._is_given("up")):
+            del chosen["up"]  # there is no choice, and what it is for other formats stays
+        try:
+            settings = ExportSettings(**chosen)
+            with _waiting(context):
+                files = export_scene(scene, self.directory, settings, self.filename)
+        except SunsplitError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for name, value in chosen.items():
+            setattr(scene.sunsplit.export, name, value)
+        for sentence in files.losses:
+            self.report({"INFO"}, sentence)
+        headline = f"{len(files.paths)} files written to {files.lights.parent}"
+        self.report({"INFO"}, headline)
+        remember(scene, [headline, f"Axes: {files.axes}", *files.losses])
+        return {"FINISHED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        from .panel import draw_export, draw_replaced
+
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        draw_export(self.layout, self)
+        draw_replaced(self.layout, Path(self.directory), self.format, self.filename)
+
+    def check(self, context: bpy.types.Context) -> bool:
+        return True  # another name or folder: draw what would be replaced there
+
+    def _chosen(self, scene: bpy.types.Scene) -> dict[str, object]:
+        """The scene's settings, and before them what was given as an argument."""
+        return {
+            name: getattr(self if self._is_given(name) else scene.sunsplit.export, name)
+            for name in EXPORT_CHOICES
+        }
+
+    def _is_given(self, name: str) -> bool:
+        return self.properties.is_property_set(name)
+
+
+@contextmanager
+def _waiting(context: bpy.types.Context) -> Iterator[None]:
+    """Shows by the mouse that Blender is busy: with a wide map for some seconds."""
+    window = None if bpy.app.background else context.window
+    if window:
+        window.cursor_modal_set("WAIT")
+    try:
+        yield
+    finally:
+        if window:
+            window.cursor_modal_restore()
 
 
 def _is_converted(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:

@@ -7,11 +7,14 @@ turn, tint and soften. Settings are folded away.
 from __future__ import annotations
 
 import textwrap
+from pathlib import Path
 
 import bpy
 from bl_ui.utils import PresetPanel
 
+from ..core.export.names import names_of
 from .controls import FACTORS, changed_factors, rotation_control
+from .exported import as_name, said_of
 from .jobs import Job
 from .overlay import draw_switch
 from .skies import lacks_suns
@@ -107,6 +110,25 @@ class _Advanced:
         draw_advanced(self.layout, context.scene.sunsplit)
 
 
+class _Export:
+    bl_label = "Export"
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.scene.sunsplit.is_converted and not Job.running
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, scene = self.layout, context.scene
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        draw_export(layout, scene.sunsplit.export)
+        layout.operator("sunsplit.export", icon="EXPORT")
+        said = said_of(scene)
+        if said:
+            _draw_report(layout, "\n".join(said), _characters(context), "CHECKMARK")
+
+
 class SUNSPLIT_PT_presets(PresetPanel, bpy.types.Panel):
     bl_label = "Sunsplit Presets"
     preset_subdir = "sunsplit"
@@ -130,6 +152,10 @@ class SUNSPLIT_PT_advanced(_InSidebar, _Advanced, bpy.types.Panel):
     bl_parent_id = "SUNSPLIT_PT_settings"
 
 
+class SUNSPLIT_PT_export(_InSidebar, _Export, bpy.types.Panel):
+    bl_parent_id = "SUNSPLIT_PT_main"
+
+
 class SUNSPLIT_PT_world(_InWorld, _Main, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
@@ -146,16 +172,22 @@ class SUNSPLIT_PT_world_advanced(_InWorld, _Advanced, bpy.types.Panel):
     bl_parent_id = "SUNSPLIT_PT_world_settings"
 
 
+class SUNSPLIT_PT_world_export(_InWorld, _Export, bpy.types.Panel):
+    bl_parent_id = "SUNSPLIT_PT_world"
+
+
 def _draw_progress(layout: bpy.types.UILayout, job: Job) -> None:
     layout.progress(factor=job.fraction, text=job.stage.capitalize() or "Sunsplit")
     layout.label(text="Cancel", icon="EVENT_ESC")
 
 
-def _draw_report(layout: bpy.types.UILayout, report: str, characters: int) -> None:
+def _draw_report(
+    layout: bpy.types.UILayout, report: str, characters: int, icon: str = "LIGHT_SUN"
+) -> None:
     box = layout.box().column(align=True)
     for number, sentence in enumerate(report.splitlines()):
         for part, line in enumerate(textwrap.wrap(sentence, characters)):
-            box.label(text=line, icon="LIGHT_SUN" if number == part == 0 else "NONE")
+            box.label(text=line, icon=icon if number == part == 0 else "NONE")
 
 
 def _draw_rotation(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
@@ -222,3 +254,27 @@ def draw_advanced(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup)
     layout.separator()
     layout.prop(settings, "two_passes")
     layout.prop(settings, "light_groups")
+
+
+def draw_export(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    """What an export may be told; what has no effect on its format is left out."""
+    layout.prop(settings, "format")
+    if settings.format == "gltf":
+        layout.prop(settings, "lux")
+    else:
+        layout.prop(settings, "up")
+    if settings.format == "usd":  # which has discs
+        layout.prop(settings, "reader")
+    else:
+        layout.prop(settings, "discs")
+
+
+def draw_replaced(layout: bpy.types.UILayout, folder: Path, kind: str, name: str) -> None:
+    """Which files of an export there are already."""
+    names = names_of(kind, as_name(name))
+    there = [one for one in (names.lights, names.scene, names.map) if (folder / one).is_file()]
+    if there:
+        column = layout.column(align=True)
+        column.label(text="Replaces:", icon="ERROR")
+        for one in there:
+            column.label(text=one, icon="BLANK1")

@@ -11,6 +11,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ..core.export.settings import LUMENS_PER_WATT
 from ..core.settings import MOST, TOLERANCE, ConversionSettings
 
 DEFAULTS = ConversionSettings()
@@ -215,6 +216,73 @@ CHOICES = {
 """The settings of a conversion, once: for the scene and as arguments of the operator."""
 
 
+EXPORT_CHOICES = {
+    "format": EnumProperty(
+        name="Format",
+        description="Whose files are written",
+        items=[
+            ("pbrt", "pbrt", "pbrt-v4: parallel lights and a map around the scene"),
+            ("mitsuba", "Mitsuba", "Mitsuba 3: parallel lights and a map around the scene"),
+            ("povray", "POV-Ray", "POV-Ray 3.7: lights and a sphere with the map"),
+            ("usd", "USD", "Universal Scene Description: distant lights and a dome light"),
+            ("gltf", "glTF", "glTF 2.0: directional lights in lux, and the map beside them"),
+        ],
+        default="usd",
+        options=_FRESH,
+    ),
+    "up": EnumProperty(
+        name="Up",
+        description="The axis that points up in the files",
+        items=[
+            ("usual", "Usual", "What the format's users expect"),
+            ("y", "Y", "Y up"),
+            ("z", "Z", "Z up, as in Blender"),
+        ],
+        default="usual",
+        options=_FRESH,
+    ),
+    "discs": EnumProperty(
+        name="Discs",
+        description="What becomes of suns with a width where the format has no such lights",
+        items=[
+            ("auto", "Automatic", "Narrow suns become many lights, wide ones go into the map"),
+            ("lights", "Many Lights", "Each becomes many lights: shadows fade in small steps"),
+            ("map", "In the Map", "Each goes into the map, as the disc that it is"),
+        ],
+        default="auto",
+        options=_FRESH,
+    ),
+    "lux": FloatProperty(
+        name="Lux",
+        description="What a light of strength 1 has in the file: 683 as in Blender's own glTF "
+        "files, 1 for viewers that take lux as a plain number",
+        default=LUMENS_PER_WATT,
+        options=_FRESH,
+        min=1e-6,
+        soft_min=1.0,
+        soft_max=LUMENS_PER_WATT,
+    ),
+    "reader": EnumProperty(
+        name="For",
+        description="Who reads the file: Blender's importer takes suns of USD for four times as "
+        "strong and twice as wide as they are",
+        items=[
+            ("usdlux", "All Others", "Whoever follows the specification, UsdLux"),
+            ("blender", "Blender", "Blender's own importer"),
+        ],
+        default="usdlux",
+        options=_FRESH,
+    ),
+}
+"""The settings of an export, once: for the scene and as arguments of the operator."""
+
+
+class SunsplitExport(bpy.types.PropertyGroup):
+    """Settings of the next export."""
+
+    __annotations__ = EXPORT_CHOICES
+
+
 class SunsplitLamp(bpy.types.PropertyGroup):
     """One lamp of a conversion: known by itself, not by a name or mark that a copy has too."""
 
@@ -283,6 +351,7 @@ class SunsplitSettings(bpy.types.PropertyGroup):
             name="Outlines", description="The bright region and its cells, for the overlay"
         ),
         "before_eevee": PointerProperty(type=SunsplitBeforeEevee),
+        "export": PointerProperty(type=SunsplitExport),
         "report": StringProperty(
             name="Report", description="What the last conversion did, a sentence a line"
         ),

@@ -76,11 +76,44 @@ def cannot_follow(node: bpy.types.Node, why: str) -> UnusableInput:
     )
 
 
-def lighting_textures(world: bpy.types.World, engine: str = "CYCLES") -> list[Contribution]:
+def lighting_textures(
+    world: bpy.types.World, engine: str = "CYCLES", undone: bool = True
+) -> list[Contribution]:
     """Every environment texture that lights the scene, several paths to one added up.
 
-    engine: of the scene, as a world may have an output for each.
+    engine: of the scene, as a world may have an output for each. undone: as if the world were not
+    converted; else a residual map is what lights a converted world.
     """
+    found: dict[tuple, Contribution] = {}
+    for place, weight in _backgrounds(_surface(world, engine)):
+        strength = place.input("Strength")
+        for part in _colour(place.input("Color"), undone):
+            part = replace(part, gain=part.gain * weight * constant(strength), strength=strength)
+            if not part.gain.any():
+                continue
+            key = (*(n.name for n in part.texture.stack), part.texture.node.name)
+            before = found.get(key)
+            if before:
+                part = replace(part, gain=part.gain + before.gain, strength=None)
+            found[key] = part
+    return list(found.values())
+
+
+def plain_light(world: bpy.types.World, engine: str = "CYCLES") -> NDArray[np.float64]:
+    """Radiance, (3,), that backgrounds without an environment texture give in all directions.
+
+    Raises UnusableInput where it is not the same in all.
+    """
+    total = np.zeros(3)
+    for place, weight in _backgrounds(_surface(world, engine)):
+        strength, colour = weight * constant(place.input("Strength")), place.input("Color")
+        if strength.any() and not any(True for _ in _colour(colour, undone=False)):
+            total += strength * constant(colour)
+    return total
+
+
+def _surface(world: bpy.types.World, engine: str) -> Input:
+    """What an engine takes the world's light from. Raises UnusableInput."""
     tree = world.node_tree
     # From Blender 5 on every world uses nodes, and asking whether it does is deprecated.
     uses_nodes = tree is not None and (bpy.app.version >= (5, 0) or world.use_nodes)
@@ -90,16 +123,7 @@ def lighting_textures(world: bpy.types.World, engine: str = "CYCLES") -> list[Co
         raise UnusableInput(
             f'The world "{world.name}" uses no nodes: give it an Environment Texture first.'
         )
-    found: dict[tuple, Contribution] = {}
-    for part in _shader(Place(output, ()).input("Surface")):
-        if not part.gain.any():
-            continue
-        key = (*(n.name for n in part.texture.stack), part.texture.node.name)
-        before = found.get(key)
-        if before:
-            part = replace(part, gain=part.gain + before.gain, strength=None)
-        found[key] = part
-    return list(found.values())
+    return Place(output, ()).input("Surface")
 
 
 def source_of(start: Input) -> Output | None:
@@ -152,30 +176,27 @@ def _by_identifier(sockets: bpy.types.NodeInputs, identifier: str) -> bpy.types.
     return next(socket for socket in sockets if socket.identifier == identifier)
 
 
-def _shader(at: Input) -> Iterator[Contribution]:
-    """Contributions of a closure."""
+def _backgrounds(at: Input) -> Iterator[tuple[Place, float]]:
+    """Backgrounds that a closure is made of, and the part that each has in it."""
     output = source_of(at)
     if output is None:
         return
     place, kind = output.place, output.socket.node.type
     if kind in ("BACKGROUND", "EMISSION"):
-        strength = constant(place.input("Strength"))
-        for part in _colour(place.input("Color")):
-            yield Contribution(part.texture, part.gain * strength, place.input("Strength"))
+        yield place, 1.0
     elif kind == "MIX_SHADER":
         factor = float(np.clip(constant(place.input(0))[0], 0, 1))
         for index, weight in ((1, 1 - factor), (2, factor)):
             if weight:
-                for part in _shader(place.input(index)):
-                    yield replace(part, gain=part.gain * weight)
+                yield from ((one, part * weight) for one, part in _backgrounds(place.input(index)))
     elif kind == "ADD_SHADER":
-        yield from _shader(place.input(0))
-        yield from _shader(place.input(1))
+        yield from _backgrounds(place.input(0))
+        yield from _backgrounds(place.input(1))
     else:
         raise cannot_follow(place.node, "is not a background")
 
 
-def _colour(at: Input) -> Iterator[Contribution]:
+def _colour(at: Input, undone: bool) -> Iterator[Contribution]:
     """Contributions of a colour; none where it does not come from an environment texture."""
     output = source_of(at)
     if output is None:
@@ -183,18 +204,19 @@ def _colour(at: Input) -> Iterator[Contribution]:
     place, kind = output.place, output.socket.node.type
     if kind == "TEX_ENVIRONMENT":
         yield Contribution(place, np.ones(3))
-    elif place.node.get(TAG):
-        # The mix of an earlier conversion: what lights is what it shows the camera.
-        yield from _colour(place.input(7))
+    elif undone and place.node.get(TAG):
+        # The mix of an earlier conversion: what lit before is what it shows the camera.
+        yield from _colour(place.input(7), undone)
     elif kind == "HUE_SAT" and _only_scales(place):
         gain = constant(place.input("Value"))
-        yield from (replace(part, gain=part.gain * gain) for part in _colour(place.input("Color")))
+        for part in _colour(place.input("Color"), undone):
+            yield replace(part, gain=part.gain * gain)
     elif kind in ("MIX", "MIX_RGB"):
-        yield from _mixed(place)
+        yield from _mixed(place, undone)
     elif kind == "VECT_MATH":
-        yield from _vector_math(place)
+        yield from _vector_math(place, undone)
     elif kind in _IDENTITIES and _has_values(place, _IDENTITIES[kind]):
-        yield from _colour(place.input("Color"))
+        yield from _colour(place.input("Color"), undone)
     elif any(_colour_textures(place)):
         raise cannot_follow(place.node, "changes the map's colours unevenly")
 
@@ -245,7 +267,7 @@ def _colour_textures(place: Place) -> Iterator[bool]:
                 yield from _colour_textures(output.place)
 
 
-def _mixed(place: Place) -> Iterator[Contribution]:
+def _mixed(place: Place, undone: bool) -> Iterator[Contribution]:
     node = place.node
     if node.type == "MIX":
         if node.data_type != "RGBA":
@@ -257,7 +279,7 @@ def _mixed(place: Place) -> Iterator[Contribution]:
         factor, first, second = (place.input(index) for index in (0, 1, 2))
         clamped = node.use_clamp
         limited = True
-    sides = list(_colour(first)), list(_colour(second))
+    sides = list(_colour(first, undone)), list(_colour(second, undone))
     if not any(sides):
         return
     if clamped:
@@ -287,8 +309,8 @@ def _gain_of_side(
     raise cannot_follow(node, f"blends the map by {node.blend_type.title()}")
 
 
-def _vector_math(place: Place) -> Iterator[Contribution]:
-    first, second = list(_colour(place.input(0))), list(_colour(place.input(1)))
+def _vector_math(place: Place, undone: bool) -> Iterator[Contribution]:
+    first, second = (list(_colour(place.input(index), undone)) for index in (0, 1))
     if not first and not second:
         return
     operation = place.node.operation

@@ -14,7 +14,7 @@ from ..core.sampling import WorldSampling
 from .light_groups import take_out_of_groups
 from .mapping import map_from_world, turns
 from .skies import REPORT, SUNS
-from .trace import TAG, Input, Place, lighting_textures
+from .trace import TAG, Contribution, Input, Place, lighting_textures
 
 TURNS = "sunsplit_turns"
 """Custom property of nodes that a conversion has added for the map to be turned by: these stay
@@ -48,6 +48,18 @@ def find_light(world: bpy.types.World, engine: str = "CYCLES") -> WorldLight:
             f'No environment texture lights the world "{world.name}": '
             "add one and connect it to the background."
         )
+    return _the_one(found)
+
+
+def light_now(world: bpy.types.World, engine: str = "CYCLES") -> WorldLight | None:
+    """The one environment texture that lights the scene as the world is: of a converted one the
+    residual map, or None where that is black or no map at all. Raises UnusableInput."""
+    found = lighting_textures(world, engine, undone=False)
+    return _the_one(found) if found else None
+
+
+def _the_one(found: list[Contribution]) -> WorldLight:
+    """Of the textures that light a world. Raises UnusableInput where that is none to follow."""
     if len(found) > 1:
         names = " and ".join(f'"{part.texture.node.name}"' for part in found)
         raise UnusableInput(f"Several environment textures light the world ({names}): keep one.")

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from .export.settings import LUMENS_PER_WATT, Discs, ExportSettings, Format, Up
+from .export.settings import LUMENS_PER_WATT, Discs, ExportSettings, Format, Reader, Up
 
 if TYPE_CHECKING:  # imported where it is used: `--help` must not wait for scipy
     from .export.run import ExportedFiles
@@ -42,6 +42,13 @@ def add_export(verb: argparse.ArgumentParser) -> None:
         help="of glTF, for a unit of irradiance (default: 683, lumens of a watt; 1 for viewers "
         "that take lux as a plain number)",
     )
+    verb.add_argument(
+        "--reader",
+        choices=get_args(Reader),
+        default="usdlux",
+        help="of USD (default: usdlux, all that follow its specification; blender for Blender's "
+        "own importer, which takes suns for four times as strong and twice as wide)",
+    )
     verb.add_argument("--json", action="store_true", help="print the result as JSON")
     verb.set_defaults(run=run_export)
 
@@ -49,7 +56,9 @@ def add_export(verb: argparse.ArgumentParser) -> None:
 def run_export(options: argparse.Namespace) -> int:
     from .export.run import export_conversion
 
-    settings = ExportSettings(options.format, options.up, options.discs, options.lux)
+    settings = ExportSettings(
+        options.format, options.up, options.discs, options.lux, options.reader
+    )
     files = export_conversion(options.conversion, options.output, settings)
     try:
         print(json.dumps(_as_dict(files)) if options.json else "\n".join(_lines(files)))

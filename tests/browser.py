@@ -17,10 +17,10 @@ def chromium() -> str | None:
 
 
 @contextmanager
-def browser() -> Iterator[Browser]:
-    """Without a window; it ends with the block. Needs `chromium()`."""
+def browser(*arguments: str) -> Iterator[Browser]:
+    """Without a window, with more arguments; it ends with the block. Needs `chromium()`."""
     with sync_playwright() as play:
-        opened = play.chromium.launch(executable_path=chromium())
+        opened = play.chromium.launch(executable_path=chromium(), args=arguments)
         try:
             yield opened
         finally:

@@ -13,6 +13,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
+
+from sunsplit.core.export.octahedral import to_sphere
 
 TOKEN = re.compile(
     r'(?P<space>[ \t\r\n]+)|(?P<comment>\#[^\r\n]*)|(?P<string>"(?:\\[bfnrt\\\'"]|[^"\\\n])*")'
@@ -149,6 +152,37 @@ class _Reader:
             raise ValueError(f"{directive} on the wrong side of WorldBegin")
         parameters = dict(_parameters(rest, KNOWN[directive, kind]))
         return Statement(directive, kind, (), parameters, self.transform, shown)
+
+
+def infinite_of(statements: list[Statement]) -> Statement:
+    """The light around the scene. Raises StopIteration where there is none."""
+    return next(s for s in statements if s.kind == "infinite")
+
+
+def pixels_of(path: Path) -> np.ndarray:
+    """Of a map, float64 (side, side, 3)."""
+    with OpenEXR.File(str(path)) as file:
+        return file.channels()["RGB"].pixels.astype(np.float64)
+
+
+def irradiance(lights: Path, facing: np.ndarray) -> np.ndarray:
+    """Of a plate, (3,), by a file's lights: each distant one, and each pixel of the map around.
+
+    facing: unit normal in the file's axes.
+    """
+    statements = read_lights(lights)
+    found = np.zeros(3)
+    for light in (s for s in statements if s.kind == "distant"):
+        to_light = light.parameters["from"] - light.parameters["to"]
+        cosine = to_light @ facing / np.linalg.norm(to_light)
+        found += max(cosine, 0) * light.parameters["L"]
+    around = infinite_of(statements)
+    radiance = pixels_of(lights.parent / around.parameters["filename"])
+    side = len(radiance)
+    places = (np.arange(side) + 0.5) / side
+    turned = to_sphere(places[None, :], places[:, None]) @ around.transform[:3, :3].T
+    cosines = np.maximum(turned @ facing, 0)
+    return found + np.einsum("ijk,ij->k", radiance, cosines) * 4 * np.pi / side**2
 
 
 def _numbers(rest: list[str], count: int) -> list[float]:

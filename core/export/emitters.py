@@ -142,31 +142,44 @@ def with_suns(
     turn: from directions in the map to the scene, (3, 3). Each disc adds what it gives, exactly.
     """
     if radiance is None:
-        canvas = np.zeros((CANVAS // 2, CANVAS, 3))
+        canvas = np.zeros((CANVAS // 2, CANVAS, 3), np.float32)
     else:
-        canvas = widened(radiance, CANVAS, has_cells).astype(np.float64)
+        canvas = np.array(widened(radiance, CANVAS, has_cells))
     height, width = canvas.shape[:2]
-    solid = sphere.row_solid_angles(width, height)[:, None]
+    solid = sphere.row_solid_angles(width, height)
     for sun in suns:
-        covered = covered_by(turn.T @ sun.to_light, sun.angular_diameter / 2, width, height)
-        canvas += (covered / (covered * solid).sum())[..., None] * sun.scalar_irradiance
-    return canvas.astype(np.float32)
+        top, covered = covered_by(turn.T @ sun.to_light, sun.angular_diameter / 2, width, height)
+        rows = slice(top, top + len(covered))
+        shining = sun.scalar_irradiance / (covered.sum(axis=1) @ solid[rows])
+        for row, part in zip(canvas[rows], covered, strict=True):
+            row += part[:, None] * shining
+    return canvas
 
 
-def covered_by(centre: Floats, half_angle: float, width: int, height: int) -> Floats:
-    """Which part of each pixel of a map a disc covers, (height, width)."""
-    rows, columns = np.indices((height, width)).reshape(2, -1)
-    middles = sphere.to_directions((columns + 0.5) / width, (rows + 0.5) / height)
+def covered_by(centre: Floats, half_angle: float, width: int, height: int) -> tuple[int, Floats]:
+    """Which part of each pixel of a map a disc covers: the first row that it may touch, and from
+    there on (rows, width)."""
+    polar = np.arctan2(np.hypot(centre[0], centre[1]), centre[2])
+    reach = np.array([polar - half_angle, polar + half_angle]) * (height / np.pi)
+    top, bottom = max(int(reach[0]) - 1, 0), min(int(reach[1]) + 2, height)
+    return top, np.stack(
+        [_covered(row, centre, half_angle, width, height) for row in range(top, bottom)]
+    )
+
+
+def _covered(row: int, centre: Floats, half_angle: float, width: int, height: int) -> Floats:
+    """Of one row, (width,)."""
+    columns = np.arange(width)
+    middles = sphere.to_directions((columns + 0.5) / width, (row + 0.5) / height)
     away = sphere.angle_between(middles, centre)
     covered = (away < half_angle).astype(np.float64)
     # A pixel reaches three quarters of its height from its centre at most; pixels are square there.
     rim = np.flatnonzero(np.abs(away - half_angle) < 0.75 * np.pi / height)
     steps = (np.arange(SUBPIXELS) + 0.5) / SUBPIXELS
     u = (columns[rim, None, None] + steps[:, None]) / width
-    v = (rows[rim, None, None] + steps) / height
-    inside = sphere.angle_between(sphere.to_directions(u, v), centre) < half_angle
-    covered[rim] = inside.mean(axis=(1, 2))
-    return covered.reshape(height, width)
+    inside = sphere.angle_between(sphere.to_directions(u, (row + steps) / height), centre)
+    covered[rim] = (inside < half_angle).mean(axis=(1, 2))
+    return covered
 
 
 def _suns(count: int) -> str:

@@ -50,6 +50,27 @@ def widened(radiance: NDArray[np.float32], least: int, has_cells: bool) -> NDArr
     return (wide * kept(scalar_irradiance(wide), scalar_irradiance(radiance))).astype(np.float32)
 
 
+def narrower(radiance: NDArray[np.floating], width: int) -> Floats:
+    """A map at most so wide, whatever its own width is: each pixel the mean of what lies in it."""
+    if radiance.shape[1] <= width:
+        return radiance.astype(np.float64)
+    solid = sphere.row_solid_angles(radiance.shape[1], radiance.shape[0])
+    light = _sums(_sums(radiance * solid[:, None, None], width // 2, 0), width, 1)
+    return light / sphere.row_solid_angles(width, width // 2)[:, None, None]
+
+
+def _sums(values: Floats, count: int, axis: int) -> Floats:
+    """Over so many equal parts of an axis; a pixel on the edge of two is shared out."""
+    length = values.shape[axis]
+    up_to = np.concatenate([np.zeros_like(values.take([0], axis)), values.cumsum(axis)], axis)
+    edges = np.arange(count + 1) * (length / count)
+    whole = np.minimum(np.floor(edges), length - 1).astype(np.intp)
+    shape = [-1 if k == axis else 1 for k in range(values.ndim)]
+    part = (edges - whole).reshape(shape)
+    at_edges = up_to.take(whole, axis) * (1 - part) + up_to.take(whole + 1, axis) * part
+    return np.diff(at_edges, axis=axis)
+
+
 def kept(found: Floats, wanted: Floats) -> Floats:
     """Factors, (3,), that make of one sum of light another; 1 where there is none."""
     return np.divide(wanted, found, out=np.ones(3), where=found > 0)

@@ -57,7 +57,7 @@ def octahedral(radiance: NDArray[np.float32], has_cells: bool) -> NDArray[np.flo
     """
     width = radiance.shape[1]
     side = min(max(width, LEAST), WIDEST)
-    parts = 2 * -(-width // side)
+    parts = max(2, -(-width // side))  # a third of one of the map's pixels each, at most
     places = (np.arange(side * parts) + 0.5) / (side * parts)
     out = np.empty((side, side, 3))
 

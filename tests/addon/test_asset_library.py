@@ -15,8 +15,10 @@ import pytest
 from mathutils import Matrix
 
 from sunsplit.addon.dropped import complete_imported
+from sunsplit.addon.exporting import skylight_of_scene
 from sunsplit.addon.skies import suns_of
 from sunsplit.core import ConversionSettings, convert, load, save
+from sunsplit.core.export.skylight import read_skylight
 from sunsplit.core.library.catalogues import catalogue_id
 from tests.addon.test_convert import inventory
 from tests.blender import (
@@ -336,6 +338,22 @@ def test_a_linked_sky_stays_linked_and_can_be_taken_away(file):
     assert scene.world == own
     assert not scene.objects
     assert not scene.sunsplit.is_converted
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("link", [False, True])
+def test_a_sky_is_exported_as_its_files_are(library, link, packed):
+    scene = fresh_scene()
+    file = library / ("packed.blend" if packed else "sunrise.blend")
+    brought("World", file, NAME, link=link)
+    used(scene, bpy.data.worlds[NAME])
+    found, expected = skylight_of_scene(scene), read_skylight(library / "sunrise.lights.json")
+    assert found.name == expected.name == "sunrise"
+    assert (found.radiance == expected.radiance).all()
+    assert np.allclose(found.turn, np.eye(3), rtol=0, atol=1e-7)
+    for sun, wanted in zip(found.suns, expected.suns, strict=True):
+        assert sun.to_light == pytest.approx(wanted.to_light, abs=1e-6)
+        assert sun.irradiance == pytest.approx(wanted.irradiance, rel=1e-5)
 
 
 @pytest.mark.skipif(bpy.app.version < (5, 0), reason="such links came with Blender 5.0")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import OpenEXR
 import pytest
 
 from sunsplit.core import (
@@ -22,7 +21,8 @@ from sunsplit.core.export.axes import Y_UP, Z_UP
 from sunsplit.core.export.emitters import emitters_of
 from sunsplit.core.export.lookup import look_up
 from sunsplit.core.export.octahedral import from_sphere, light_of_octahedral, octahedral, to_sphere
-from tests.pbrt_files import read_lights, read_scene, tokens
+from tests.pbrt_files import infinite_of, pixels_of, read_lights, read_scene, tokens
+from tests.pbrt_files import irradiance as irradiance_by_pbrt
 from tests.plates import ORIENTATIONS, irradiance, unit
 
 HALF = 5e-4
@@ -41,15 +41,15 @@ def sky(conversion):
 
 @pytest.fixture(scope="module")
 def written(sky, tmp_path_factory):
-    """By which axis is up: the statements and the pixels of the map."""
+    """By which axis is up: the statements, the pixels of the map and the lights' file."""
     found = {}
     for up in ("usual", "y"):
         folder = tmp_path_factory.mktemp(up)
         files = export_conversion(sky, folder, ExportSettings("pbrt", up))
         statements = read_lights(files.lights)
-        map_of_lights = folder / infinite(statements).parameters["filename"]
+        map_of_lights = folder / infinite_of(statements).parameters["filename"]
         assert map_of_lights == files.map
-        found[up] = statements, pixels_of(map_of_lights)
+        found[up] = statements, pixels_of(map_of_lights), files.lights
     return found
 
 
@@ -58,19 +58,10 @@ def directions(count, seed=1):
     return found / np.linalg.norm(found, axis=1)[:, None]
 
 
-def pixels_of(path):
-    with OpenEXR.File(str(path)) as file:
-        return file.channels()["RGB"].pixels.astype(np.float64)
-
-
-def infinite(statements):
-    return next(s for s in statements if s.kind == "infinite")
-
-
 def light_from(statements, radiance, to_light):
     """Radiance that pbrt's infinite light has in directions of the world, (n, 3): its pixels are
     not blended."""
-    inner = to_light @ infinite(statements).transform[:3, :3]
+    inner = to_light @ infinite_of(statements).transform[:3, :3]
     s, t = from_sphere(inner)
     side = len(radiance)
     column, row = (np.minimum((p * side).astype(int), side - 1) for p in (s, t))
@@ -108,7 +99,7 @@ def test_a_constant_map_stays_constant():
 
 def test_a_thousand_directions(written, sky):
     """Each is within what the map has around it, by the width of a pixel, and all are unbiased."""
-    statements, radiance = written["usual"]
+    statements, radiance, _ = written["usual"]
     emitters = emitters_of(sky, "many rays", "auto")
     seen = directions(1000)
     found = light_from(statements, radiance, seen)
@@ -147,21 +138,9 @@ def test_cells_of_a_voronoi_map_are_not_blended(sunrise):
 @pytest.mark.parametrize("up", ["usual", "y"])
 def test_a_plate_gets_what_the_hdri_gives(written, sunrise, normal, up):
     """From the files alone: every distant light and every pixel of the infinite one."""
-    statements, radiance = written[up]
     axes = Z_UP if up == "usual" else Y_UP
     normal = unit(normal)
-    facing = axes.of(normal)
-    found = np.zeros(3)
-    for light in (s for s in statements if s.kind == "distant"):
-        to_light = light.parameters["from"] - light.parameters["to"]
-        cosine = to_light @ facing / np.linalg.norm(to_light)
-        found += max(cosine, 0) * light.parameters["L"]
-    side = len(radiance)
-    places = (np.arange(side) + 0.5) / side
-    inner = to_sphere(places[None, :], places[:, None])
-    turned = inner @ infinite(statements).transform[:3, :3].T
-    cosines = np.maximum(turned @ facing, 0)
-    found += np.einsum("ijk,ij->k", radiance, cosines) * 4 * np.pi / side**2
+    found = irradiance_by_pbrt(written[up][2], axes.of(normal))
     expected = irradiance(sunrise, normal)
     print(found / expected - 1)
     assert found == pytest.approx(expected, rel=0.005)
@@ -190,7 +169,7 @@ def test_any_name(tmp_path, sky, name):
     small = replace(sky, name=name, radiance=np.ones((4, 8, 3), np.float32))
     export_conversion(small, tmp_path, ExportSettings("pbrt"))
     statements = read_scene(tmp_path / f"{name}.scene.pbrt")
-    assert (tmp_path / infinite(statements).parameters["filename"]).is_file()
+    assert (tmp_path / infinite_of(statements).parameters["filename"]).is_file()
 
 
 def test_the_reader_refuses_what_pbrt_would():

@@ -152,6 +152,34 @@ def test_a_setting_is_changed_with_the_mouse(window: Window, quiet: None):
     window.wait_for("not bpy.context.scene.sunsplit.skips")
 
 
+# Export
+
+BROWSER = "len(bpy.context.window_manager.windows) == 2"
+
+
+def test_export_through_the_file_browser(
+    window: Window, before: dict, converted: dict, quiet: None
+):
+    """Return exports; Escape does not; and it is no step to undo."""
+    window.ask("setattr(bpy.context.scene.sunsplit.export, 'format', 'pbrt')")
+    window.unfold("SUNSPLIT_PT_export")
+    written = [window.folder / f"sky.{end}" for end in ("lights.pbrt", "scene.pbrt", "pbrt.exr")]
+    for key in ("Escape", "Return"):
+        window.press("sunsplit.export")
+        window.wait_for(BROWSER)
+        window.key(key)
+        window.wait_for(f"not {BROWSER}")
+        assert [path.is_file() for path in written] == [key == "Return"] * 3
+    assert window.ask("state()") == converted
+    said = [line for line in window.ask("reports()") if line.startswith("3 files written to ")]
+    assert said == [f"3 files written to {window.debian.inside(window.folder)}"]
+    window.key("ctrl+z")
+    window.wait_for(RESTORED)
+    assert window.ask("state()") == before
+    for path in written:
+        path.unlink()
+
+
 # Long work
 
 
