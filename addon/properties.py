@@ -223,7 +223,7 @@ EXPORT_CHOICES = {
         items=[
             ("pbrt", "pbrt", "pbrt-v4: parallel lights and a map around the scene"),
             ("mitsuba", "Mitsuba", "Mitsuba 3: parallel lights and a map around the scene"),
-            ("povray", "POV-Ray", "POV-Ray 3.7: lights and a sphere with the map"),
+            ("povray", "POV-Ray", "POV-Ray 3.7: area lights, and a map that lights by radiosity"),
             ("usd", "USD", "Universal Scene Description: distant lights and a dome light"),
             ("gltf", "glTF", "glTF 2.0: directional lights in lux, and the map beside them"),
         ],
