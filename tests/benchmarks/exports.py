@@ -21,17 +21,11 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from sunsplit.core import read_skylight
-from sunsplit.core.export.axes import Y_UP
+from sunsplit.core.export.axes import Y_UP, Y_UP_LEFT
 from tests import exports_in_blender, mitsuba_renders, pbrt_files, povray_renders
 from tests.exporting import HEIGHT, WIDTH, Reference, converted, exported, reference
 from tests.exporting import shift_of_shadows as shift_of
 from tests.plates import ALBEDO, ORIENTATIONS, irradiance, unit
-from tests.render.compare import Estimate, estimate_of
-
-TOLERANCE = 0.4
-"""Percent: what the conversions themselves may be wrong by, that exports be seen behind it."""
-
-SEEDS = 2
 
 
 @dataclass(frozen=True)
@@ -56,20 +50,30 @@ def _mitsuba_plate(folder: Path, name: str, normal: np.ndarray, samples: int) ->
     return mitsuba_renders.plate(lights, normal, Y_UP.of, samples, 1).mean(axis=(0, 1))
 
 
+def _povray(folder: Path, name: str, *_: int) -> np.ndarray:
+    scene = folder / f"{name}.scene.pov"
+    return povray_renders.picture(scene, WIDTH, HEIGHT, "+A0.1", "+R3", "-J")
+
+
+def _povray_plate(folder: Path, name: str, normal: np.ndarray, _: int) -> np.ndarray:
+    lights = folder / f"{name}.lights.inc"
+    return povray_renders.plate(lights, normal, Y_UP_LEFT.of).mean(axis=(0, 1))
+
+
 def _pbrt_plate(folder: Path, name: str, normal: np.ndarray, _: int) -> np.ndarray:
     return ALBEDO / np.pi * pbrt_files.irradiance(folder / f"{name}.lights.pbrt", normal)
 
 
 RENDERERS = (
-    Renderer("Mitsuba 3", "mitsuba", (), _mitsuba, _mitsuba_plate, 64),
-    Renderer("POV-Ray 3.7", "povray", (), povray_renders.stage, povray_renders.plate, 1),
+    Renderer("Mitsuba 3", "mitsuba", (), _mitsuba, _mitsuba_plate, 128),
+    Renderer("POV-Ray 3.7", "povray", (), _povray, _povray_plate, 1),
     Renderer(
         *("USD in Cycles", "usd", ("--reader", "blender")),
-        *(exports_in_blender.usd_stage, exports_in_blender.usd_plate, 96),
+        *(exports_in_blender.usd_stage, exports_in_blender.usd_plate, 192),
     ),
     Renderer(
         *("glTF in Cycles", "gltf", ()),
-        *(exports_in_blender.gltf_stage, exports_in_blender.gltf_plate, 96),
+        *(exports_in_blender.gltf_stage, exports_in_blender.gltf_plate, 192),
     ),
     Renderer("pbrt-v4, added up", "pbrt", (), None, _pbrt_plate, 1),
 )
@@ -91,12 +95,14 @@ class Row:
     picture: np.ndarray | None
 
 
-def measure(hdri: Path, renderers: Sequence[Renderer], quick: bool) -> tuple[Reference, list[Row]]:
-    """One map by all renderers."""
+def measure(
+    hdri: Path, renderers: Sequence[Renderer], options: Sequence[str], quick: bool
+) -> tuple[Reference, list[Row]]:
+    """One map by all renderers. options: of its conversion."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         wanted = reference(hdri, folder, 16 if quick else 192, 2 if quick else 4)
-        lights = converted(hdri, folder, "--tolerance", str(TOLERANCE))
+        lights = converted(hdri, folder, *options)
         lamps = len(read_skylight(lights).suns)
         rows = []
         for renderer in renderers:
@@ -111,11 +117,10 @@ def measure(hdri: Path, renderers: Sequence[Renderer], quick: bool) -> tuple[Ref
     return wanted, rows
 
 
-def _stage(renderer: Renderer, folder: Path, name: str, quick: bool) -> Estimate | None:
+def _stage(renderer: Renderer, folder: Path, name: str, quick: bool) -> np.ndarray | None:
     if renderer.stage is None:
         return None
-    samples = max(renderer.samples // 8, 1) if quick else renderer.samples
-    return estimate_of([renderer.stage(folder, name, samples, seed) for seed in range(SEEDS)])
+    return renderer.stage(folder, name, max(renderer.samples // (16 if quick else 1), 1), 1)
 
 
 def _plates(renderer: Renderer, folder: Path, hdri: Path, quick: bool) -> np.ndarray:
@@ -133,15 +138,15 @@ def _row(
     renderer: Renderer,
     lamps: int,
     wanted: Reference,
-    found: Estimate | None,
+    found: np.ndarray | None,
     plates: np.ndarray,
     seconds: float,
 ) -> Row:
     if found is None:
         return Row(name, renderer, lamps, None, None, plates, seconds, None)
-    means = found.mean.mean(axis=(0, 1)) / wanted.picture.mean.mean(axis=(0, 1)) - 1
-    shift = shift_of(wanted, found.mean)
-    return Row(name, renderer, lamps, means, shift, plates, seconds, found.mean)
+    means = found.mean(axis=(0, 1)) / wanted.picture.mean.mean(axis=(0, 1)) - 1
+    shift = shift_of(wanted, found)
+    return Row(name, renderer, lamps, means, shift, plates, seconds, found)
 
 
 def _line(row: Row) -> str:
@@ -154,13 +159,14 @@ def _line(row: Row) -> str:
     )
 
 
-def table(rows: Sequence[Row]) -> str:
-    """All of it, in Markdown."""
+def table(rows: Sequence[Row], options: Sequence[str]) -> str:
+    """All of it, in Markdown. options: of the conversions."""
+    how = f"with `{' '.join(options)}`" if options else "as they are by default"
     head = (
         "# Exports, rendered\n\n"
         "Made by `python -m tests.benchmarks.exports`. The scene that comes with every export, "
         f"{WIDTH} x {HEIGHT} pixels, and a white plate that faces eight ways, against Cycles under "
-        f"the plain HDRI (plates: in closed form). Conversions with `--tolerance {TOLERANCE}`. "
+        f"the plain HDRI (plates: in closed form). Conversions {how}. "
         "In percent; *shadows*: how many pixels they lie elsewhere at most; *worst plate*: of the "
         "worst channel, relative to that plate, and to the mean of the eight (a dark plate's own "
         "light is a hundredth of it); seconds of the command that exports, start of Python "
@@ -196,19 +202,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("maps", type=Path, nargs="+")
     parser.add_argument("-o", "--output", type=Path, default=Path("out"))
+    parser.add_argument("--tolerance", help="of the conversions, in percent")
     parser.add_argument("--formats", nargs="*", help="only these")
     parser.add_argument("--pictures", nargs="*", help="names of the maps that are shown")
     parser.add_argument("--quick", action="store_true", help="too noisy to tell: for tests")
     options = parser.parse_args(arguments)
     renderers = [r for r in RENDERERS if not options.formats or r.format in options.formats]
+    tolerance = ["--tolerance", options.tolerance] if options.tolerance else []
     rows, pictures = [], []
     for hdri in options.maps:
-        wanted, some = measure(hdri, renderers, options.quick)
+        wanted, some = measure(hdri, renderers, tolerance, options.quick)
         rows += some
         if not options.pictures or hdri.stem in options.pictures:
             pictures.append((hdri.stem, wanted, some))
     options.output.mkdir(parents=True, exist_ok=True)
-    (options.output / "exports.md").write_text(table(rows), encoding="utf-8")
+    (options.output / "exports.md").write_text(table(rows, tolerance), encoding="utf-8")
     if pictures:
         picture(pictures).save(options.output / "exports.png", optimize=True)
 
