@@ -11,7 +11,7 @@ import pytest
 
 from sunsplit.core import sphere
 from sunsplit.core.export.axes import Y_UP
-from sunsplit.core.export.gltf_document import data_uri, quaternion
+from sunsplit.core.export.gltf.document import data_uri, quaternion
 from sunsplit.core.export.stage import Ball, mesh_of
 from tests.browser import browser, chromium
 from tests.gltf_validator import PACKAGES

@@ -16,11 +16,11 @@ from scipy.spatial.transform import Rotation
 from sunsplit.core import ExportSettings, convert, export_conversion, load, skylight_of, sphere
 from sunsplit.core.environment import scalar_irradiance
 from sunsplit.core.export.axes import Y_UP
-from sunsplit.core.export.cube import cube_directions
-from sunsplit.core.export.glossy import blurred
-from sunsplit.core.export.harmonics import harmonics, irradiance_harmonics
+from sunsplit.core.export.gltf.cube import cube_directions
+from sunsplit.core.export.gltf.glossy import blurred
+from sunsplit.core.export.gltf.harmonics import harmonics, irradiance_harmonics
+from sunsplit.core.export.gltf.rgbd import packed, unpacked
 from sunsplit.core.export.lookup import narrower
-from sunsplit.core.export.rgbd import packed, unpacked
 from sunsplit.core.export.skylight import Skylight
 from tests.files import noise
 from tests.plates import irradiance_by

@@ -12,17 +12,17 @@ from urllib.parse import quote
 
 import numpy as np
 
-from .. import sphere
-from .axes import Y_UP, Axes
-from .emitters import Emitters, Rays, emitters_of
-from .gltf_document import Document, Json, numbers_of, quaternion
-from .gltf_images import ImageBasedLight, add_image_based_light, image_based_light
-from .gltf_scene import add_stage
-from .made import Made
-from .names import names_of
-from .settings import ExportSettings
-from .skylight import Skylight
-from .stage import STAGE
+from ... import sphere
+from ..axes import Y_UP, Axes
+from ..emitters import Emitters, Rays, emitters_of
+from ..made import Made
+from ..names import names_of
+from ..settings import ExportSettings
+from ..skylight import Skylight
+from ..stage import STAGE
+from .document import Document, Json, numbers_of, quaternion
+from .images import ImageBasedLight, add_image_based_light, image_based_light
+from .scene import add_stage
 
 PUNCTUAL = "KHR_lights_punctual"
 

@@ -12,16 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..environment import whole_part
-from ..pixels import HeldPixels
-from ..reduction import narrowed
-from .axes import Axes
+from ...environment import whole_part
+from ...pixels import HeldPixels
+from ...reduction import narrowed
+from ..axes import Axes
+from ..emitters import Emitters
+from ..lookup import look_up, narrower
 from .cube import averaged, cube_directions
-from .emitters import Emitters
+from .document import Document, data_uri
 from .glossy import blurred
-from .gltf_document import Document, data_uri
 from .harmonics import irradiance_harmonics
-from .lookup import look_up, narrower
 from .rgbd import HIGHEST, packed, png
 
 Floats = NDArray[np.float64]

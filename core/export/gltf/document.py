@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..version import version
+from ...version import version
 
 Floats = NDArray[np.float64]
 Json = dict[str, Any]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import sphere
+from ... import sphere
 
 Floats = NDArray[np.float64]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .axes import Axes
-from .gltf_document import Document, numbers_of, quaternion
-from .stage import Camera, Stage, Thing, mesh_of
+from ..axes import Axes
+from ..stage import Camera, Stage, Thing, mesh_of
+from .document import Document, numbers_of, quaternion
 
 SPECULAR = "KHR_materials_specular"
 
