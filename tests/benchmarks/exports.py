@@ -5,7 +5,7 @@
 For each map: the scene that comes with every export, and a white plate that faces eight ways, from
 the exported files by Mitsuba, by POV-Ray, and by Cycles through Blender's importers of USD and
 glTF. What is written for pbrt is added up from its files, for the plates alone. Writes exports.md
-and exports.png, the renderers' pictures side by side.
+and exports.jpg, the renderers' pictures side by side.
 """
 
 from __future__ import annotations
@@ -198,7 +198,7 @@ def picture(pictures: Sequence[tuple[str, Reference, Sequence[Row]]]) -> Image.I
     return out
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(arguments: Sequence[str] | None = None) -> list[Row]:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("maps", type=Path, nargs="+")
     parser.add_argument("-o", "--output", type=Path, default=Path("out"))
@@ -218,7 +218,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options.output.mkdir(parents=True, exist_ok=True)
     (options.output / "exports.md").write_text(table(rows, tolerance), encoding="utf-8")
     if pictures:
-        picture(pictures).save(options.output / "exports.png", optimize=True)
+        picture(pictures).save(options.output / "exports.jpg", quality=90, subsampling=0)
+    return rows
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from tests.benchmarks import (
     eevee,
     eevee_report,
     equal_error,
+    exports,
     library,
     library_cluster,
     library_report,
@@ -257,3 +258,17 @@ def test_library_cluster(tmp_path):
     assert [(one.maps, one.failed) for one in results] == [(12, 0)] * 5
     lines = (tmp_path / "library_cluster.md").read_text().splitlines()
     assert len([line for line in lines if line.startswith("| ")]) == 2 + len(results)
+
+
+def test_exports(tmp_path, sunrise):
+    rows = exports.main([str(sunrise), "--quick", "-o", str(tmp_path)])
+    assert [row.renderer for row in rows] == list(exports.RENDERERS)
+    for row in rows:
+        assert row.plates.max() < 0.05
+        if row.picture is not None:
+            # Too few samples for more: what is looked for is light that is missing or twice there.
+            assert np.abs(row.means).max() < 0.05
+            assert row.shift < 2
+    lines = (tmp_path / "exports.md").read_text().splitlines()
+    assert sum(line.startswith("| spruit_sunrise_1k") for line in lines) == len(rows)
+    assert (tmp_path / "exports.jpg").stat().st_size > 10_000

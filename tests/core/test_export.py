@@ -335,6 +335,12 @@ def test_a_folder_that_may_not_be_written(tmp_path, written):
         export_conversion(written, tmp_path, ExportSettings("pbrt"))
 
 
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no system's folder to try it in")
+def test_a_folder_that_nobody_may_write(written):
+    with pytest.raises(CannotWrite, match="Cannot write into /proc"):
+        export_conversion(written, "/proc/exported", ExportSettings("pbrt"))
+
+
 def test_a_folder_that_is_a_file(tmp_path, written):
     place = tmp_path / "file"
     place.write_text("mine")
