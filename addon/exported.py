@@ -11,7 +11,7 @@ from ..core.export.names import ENDINGS
 UNSAFE = re.compile(r'[\x00-\x1f/\\:*?"<>|]')
 """Characters that some system does not have in the names of files."""
 
-# Not with the scene, as an export changes nothing in it and is no step to undo.
+# Not with the scene, as an export is no step to undo.
 _said: dict[int, list[str]] = {}
 
 

@@ -77,6 +77,8 @@ def _sun(lamp: bpy.types.Object) -> Sun:
     shared = data.normalize or not half
     irradiance = strength if shared else strength * np.pi * np.sin(half) ** 2
     to_light = np.array(lamp.matrix_world.col[2][:3], np.float64)
+    if not to_light.any():
+        raise UnusableInput(f'The lamp "{lamp.name}" is scaled to nothing: it has no direction.')
     # The stratum, which is a map's, is of no use to an export.
     return Sun(
         to_light / np.linalg.norm(to_light),

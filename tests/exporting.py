@@ -20,6 +20,14 @@ WIDTH, HEIGHT = 240, 135
 SHADOWS = 1.0
 """Pixels that shadows may be elsewhere (issue: within a pixel)."""
 
+LIKENESS = 0.95
+"""Correlation of a window's pictures that have the same shadows but for half a pixel and noise: of
+a pole's shadow that is two pixels elsewhere it is below."""
+
+ALONG = 0.2
+"""A shift along an edge changes nothing but noise: a direction in which a window's picture changes
+by a smaller part of what it does in another one is not asked about."""
+
 MEAN = 0.005
 """Relative difference of the means of each channel that an export may make (issue: 0.5 %)."""
 
@@ -85,39 +93,52 @@ def _ground(scene: bpy.types.Scene) -> np.ndarray:
     return binary_erosion(seen, iterations=3, border_value=1)
 
 
-def shift_of_shadows(wanted: Reference, found: np.ndarray, windows: int = 4) -> float:
-    """How many pixels shadows on the ground lie elsewhere than Cycles has them, at most.
+@dataclass(frozen=True)
+class Shadows:
+    """shift: how many pixels they lie elsewhere at most. likeness: correlation of the pictures
+    where they are least alike. Both nan where no shadow has an edge."""
 
-    The picture is looked at in windows; in each that has edges, the shift that explains the
-    difference best, by least squares, where the pictures change by their gradient times the shift
-    (Lucas and Kanade 1981). Slightly blurred, so that noise does not count as edges.
+    shift: float
+    likeness: float
+
+
+def shadows_of(wanted: Reference, found: np.ndarray, windows: int = 4) -> Shadows:
+    """How shadows on the ground are other than Cycles has them, window by window of the picture.
+
+    In each window that has edges: the correlation, which tells shadows that are missing or far
+    away; and the shift that explains the difference best, by least squares, where a picture changes
+    by its gradient times the shift (Lucas and Kanade 1981). Slightly blurred, so that noise does
+    not count as edges.
     """
     before, after = (
         gaussian_filter(picture.mean(axis=-1), 1.5) for picture in (wanted.picture.mean, found)
     )
     down, right = np.gradient(before)
     height, width = before.shape
-    shifts = []
+    shifts, likenesses = [], []
     for top in np.array_split(np.arange(height), windows):
         for left in np.array_split(np.arange(width), windows):
             at = np.ix_(top, left)
             inside = wanted.ground[at]
             slopes = np.stack([down[at][inside], right[at][inside]], axis=-1)
-            # An edge: where the picture changes by a tenth of its mean over a pixel or so.
-            steep = np.hypot(*slopes.T) > 0.05 * before.mean()
-            if steep.sum() < 12:
+            # An edge: where the picture changes by a twentieth of its mean from pixel to pixel.
+            if (np.hypot(*slopes.T) > 0.05 * before.mean()).sum() < 12:
                 continue
-            change = (before - after)[at][inside]
-            shift = np.linalg.lstsq(slopes, change, rcond=1e-3)[0]
-            shifts.append(np.hypot(*shift))
-    return float(max(shifts, default=0.0))
+            one, other = before[at][inside], after[at][inside]
+            shifts.append(np.hypot(*np.linalg.lstsq(slopes, one - other, rcond=ALONG)[0]))
+            with np.errstate(invalid="ignore"):  # where the other has no edges at all
+                likenesses.append(np.nan_to_num(np.corrcoef(one, other)[0, 1]))
+    if not shifts:
+        return Shadows(np.nan, np.nan)
+    return Shadows(float(max(shifts)), float(min(likenesses)))
 
 
 def shadows_agree(wanted: Reference, found: np.ndarray) -> None:
-    """Fail when shadows on the ground lie more than a pixel elsewhere."""
-    shift = shift_of_shadows(wanted, found)
-    print(f"shadows are {shift:.2f} pixels elsewhere")
-    assert shift < SHADOWS
+    """Fail when shadows on the ground lie more than a pixel elsewhere, or are not there."""
+    shadows = shadows_of(wanted, found)
+    print(shadows)
+    assert shadows.shift < SHADOWS
+    assert shadows.likeness > LIKENESS
 
 
 def converted(hdri: Path, folder: Path, *options: str) -> Path:

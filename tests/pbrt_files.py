@@ -23,7 +23,14 @@ TOKEN = re.compile(
 )
 ESCAPES = {"b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t"}
 
-NUMBERS = {"Scale": 3, "LookAt": 9, "Translate": 3, "Rotate": 4, "Transform": 16}
+NUMBERS = {
+    "Scale": 3,
+    "LookAt": 9,
+    "Translate": 3,
+    "Rotate": 4,
+    "Transform": 16,
+    "ConcatTransform": 16,
+}
 """Directives that take so many numbers."""
 
 PLAIN = ("WorldBegin", "AttributeBegin", "AttributeEnd", "Identity")
@@ -123,8 +130,10 @@ class _Reader:
             step = np.diag([*values, 1.0])
         elif directive == "Translate":
             step[:3, 3] = values
-        elif directive == "Transform":  # replaces what there was, column by column
-            self.transform, step = np.eye(4), np.reshape(values, (4, 4)).T
+        elif directive in ("Transform", "ConcatTransform"):  # column by column
+            step = np.reshape(values, (4, 4)).T
+            if directive == "Transform":  # replaces what there was
+                self.transform = np.eye(4)
         elif shown:
             raise ValueError(f"{directive} in the world is not looked at here")
         self.transform = self.transform @ step
@@ -174,6 +183,7 @@ def irradiance(lights: Path, facing: np.ndarray) -> np.ndarray:
     found = np.zeros(3)
     for light in (s for s in statements if s.kind == "distant"):
         to_light = light.parameters["from"] - light.parameters["to"]
+        to_light = light.transform[:3, :3] @ to_light
         cosine = to_light @ facing / np.linalg.norm(to_light)
         found += max(cosine, 0) * light.parameters["L"]
     around = infinite_of(statements)

@@ -76,6 +76,9 @@ class Rays:
     width: float
 
 
+CELLS_BLENDED = "The edges of the Voronoi map's cells are blended over a pixel."
+"""Where a renderer always blends between a map's pixels."""
+
 Narrow = Literal["discs", "many rays", "one ray"]
 """What a format makes of suns that are not painted: each as it is, many rays each, or one each."""
 
@@ -162,9 +165,12 @@ def covered_by(centre: Floats, half_angle: float, width: int, height: int) -> tu
     polar = np.arctan2(np.hypot(centre[0], centre[1]), centre[2])
     reach = np.array([polar - half_angle, polar + half_angle]) * (height / np.pi)
     top, bottom = max(int(reach[0]) - 1, 0), min(int(reach[1]) + 2, height)
-    return top, np.stack(
-        [_covered(row, centre, half_angle, width, height) for row in range(top, bottom)]
-    )
+    rows = range(top, bottom)
+    covered = np.stack([_covered(row, centre, half_angle, width, height) for row in rows])
+    if not covered.any():  # so narrow that it lies between all places that were looked at
+        row, column = divmod(int(sphere.pixels_at(centre[None], width, height)[0]), width)
+        covered[row - top, column] = 1
+    return top, covered
 
 
 def _covered(row: int, centre: Floats, half_angle: float, width: int, height: int) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from ..version import version
 from .axes import Axes
 from .emitters import Emitters
-from .names import Names
+from .names import Names, shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +29,8 @@ class Made:
 
 def heading(emitters: Emitters, axes: Axes, losses: tuple[str, ...]) -> list[str]:
     """What every file says of itself, in lines without the signs of a comment."""
-    # A line break in it would end the comment that it stands in.
-    name = emitters.name.encode("unicode_escape").decode().replace("--", "- -")
+    # No line break in it ends a comment, and no two dashes one of XML.
+    name = re.sub("-(?=-)", "- ", shown(emitters.name))
     return [
         f'The light of "{name}", by Sunsplit {version()}.',
         f"Axes: {axes.name}. Units: metres; radiance as in the HDRI, linear Rec.709.",

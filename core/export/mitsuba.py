@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..environment import LUMINANCE_WEIGHTS, scalar_irradiance
 from .axes import Y_UP, Axes, chosen_axes
-from .emitters import Emitters, emitters_of
+from .emitters import CELLS_BLENDED, Emitters, emitters_of
 from .made import Made, heading, number, numbers
-from .names import Names, names_of
+from .names import Names, check_text, names_of
 from .settings import ExportSettings, Up
 from .skylight import Floats, Skylight
 from .stage import STAGE, Ball, Box, Camera, Stage, Thing
@@ -30,8 +30,9 @@ def made_for_mitsuba(sky: Skylight, settings: ExportSettings) -> Made:
     """Y up, as Mitsuba's own maps are."""
     axes = chosen_axes(settings.up, Y_UP)
     emitters = emitters_of(sky, "many rays", settings.discs)
-    losses = tuple(emitters.losses)
+    losses = (*emitters.losses, *([CELLS_BLENDED] if emitters.has_cells else []))
     names = names_of("mitsuba", sky.name)
+    check_text(sky.name, "Mitsuba")
     comment = "\n".join(["", *heading(emitters, axes, losses), ""])
     return Made(
         names,
@@ -99,11 +100,9 @@ def _radiance(emitters: Emitters) -> NDArray[np.float32] | None:
     height, width = rows.shape[:2]
     out = np.empty((2 * height + 1, width, 3), np.float32)
     out[1::2] = rows
-    if emitters.has_cells:
-        out[2::2] = rows
-    else:
-        out[2:-1:2] = (rows[:-1] + rows[1:]) / 2
-    out[0], out[-1] = rows[0].mean(axis=0), rows[-1].mean(axis=0)
+    out[2:-1:2] = (rows[:-1] + rows[1:]) / 2
+    for pole in (0, -1):
+        out[pole] = rows[pole].mean(axis=0, dtype=np.float64)
     return out
 
 

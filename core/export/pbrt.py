@@ -7,7 +7,7 @@ import numpy as np
 from .axes import Z_UP, Axes, chosen_axes
 from .emitters import Emitters, Rays, emitters_of
 from .made import Made, heading, number, numbers
-from .names import Names, names_of
+from .names import Names, check_text, names_of
 from .octahedral import octahedral
 from .settings import ExportSettings
 from .skylight import Skylight
@@ -20,6 +20,7 @@ def made_for_pbrt(sky: Skylight, settings: ExportSettings) -> Made:
     emitters = emitters_of(sky, "many rays", settings.discs)
     losses = tuple(emitters.losses)
     names = names_of("pbrt", sky.name)
+    check_text(sky.name, "pbrt")
     radiance = None
     if emitters.radiance is not None:
         radiance = octahedral(emitters.radiance, emitters.has_cells)
@@ -46,7 +47,7 @@ def _lights(emitters: Emitters, axes: Axes, map_name: str) -> list[str]:
         turn[:3, :3] = axes.rotation_of_map(emitters.turn, np.eye(3))
         lines += [
             "AttributeBegin",
-            f"  Transform [ {numbers(turn.T)} ]",  # column by column
+            f"  ConcatTransform [ {numbers(turn.T)} ]",  # column by column
             f'  LightSource "infinite" "string filename" {_text(map_name)}',
             "AttributeEnd",
         ]

@@ -6,7 +6,10 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
+
 from ..conversion import Conversion
+from ..errors import UnusableInput
 from ..files import exr
 from ..files.atomic import written_together
 from .made import Made
@@ -59,8 +62,24 @@ def export_conversion(
 
 def made_for(sky: Skylight, settings: ExportSettings) -> Made:
     """What a format makes of a sky. Raises UnusableInput where what it takes is not installed."""
+    _check(sky)
     module = import_module(f".{settings.format}", __package__)
     return getattr(module, f"made_for_{settings.format}")(sky, settings)
+
+
+def _check(sky: Skylight) -> None:
+    """Raise UnusableInput for what is no light; files of conversions are checked when read."""
+    parts = [(sun.to_light, sun.irradiance, sun.scalar_irradiance) for sun in sky.suns]
+    given = [part for sun in parts for part in sun[1:]]
+    numbers = [sky.turn, *(sun[0] for sun in parts)]
+    if sky.radiance is not None:
+        given.append(sky.radiance)
+    if not all(np.isfinite(part).all() for part in (*numbers, *given)):
+        raise UnusableInput(f"The light of {sky.name} is not finite: it cannot be exported.")
+    if any((part < 0).any() for part in given):
+        raise UnusableInput(
+            f"The light of {sky.name} is negative in places: there is no such light."
+        )
 
 
 def _skylight(source: str | Path | Conversion | Skylight) -> Skylight:

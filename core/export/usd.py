@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
-from unicodedata import category
 
 import numpy as np
 
@@ -18,9 +17,9 @@ from .. import sphere
 from ..errors import UnusableInput
 from ..suns import Sun
 from .axes import Z_UP, Axes, chosen_axes
-from .emitters import Emitters, emitters_of
+from .emitters import CELLS_BLENDED, Emitters, emitters_of
 from .made import Made, heading
-from .names import names_of
+from .names import check_text, names_of
 from .settings import ExportSettings, Reader
 from .skylight import Skylight
 from .stage import STAGE
@@ -48,14 +47,9 @@ def made_for_usd(sky: Skylight, settings: ExportSettings) -> Made:
         import pxr.UsdLux  # noqa: F401
     except ImportError as error:
         raise UnusableInput(
-            "USD needs Pixar's library, which Blender of blender.org has: "
-            'pip install "sunsplit[usd]".'
+            "USD needs Pixar's library, which Blender of blender.org has: pip install usd-core."
         ) from error
-    if not _can_be_referred_to(sky.name):
-        raise UnusableInput(
-            f"USD cannot refer to files named {sky.name!r}: rename the conversion, without control "
-            "characters and backslashes."
-        )
+    check_text(sky.name, "USD", ("\\", ":SDF_FORMAT_ARGS:"))
     axes = chosen_axes(settings.up, Z_UP)
     emitters = emitters_of(sky, "discs", settings.discs)
     reader = settings.reader if emitters.discs else None
@@ -70,16 +64,10 @@ def made_for_usd(sky: Skylight, settings: ExportSettings) -> Made:
     )
 
 
-def _can_be_referred_to(name: str) -> bool:
-    unspeakable = {"Cc", "Cs"}  # control characters, and what was no Unicode
-    spoken = not any(char == "\\" or category(char) in unspeakable for char in name)
-    return spoken and ":SDF_FORMAT_ARGS:" not in name
-
-
 def _losses(emitters: Emitters, reader: Reader | None) -> list[str]:
     lines = []
     if emitters.has_cells:
-        lines.append("Renderers blend the edges of the Voronoi map's cells over a pixel.")
+        lines.append(CELLS_BLENDED)
     if reader == "usdlux":
         lines.append(
             "Blender's own importer takes such suns for four times as strong and twice as wide: "

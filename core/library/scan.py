@@ -17,6 +17,7 @@ from .options import LibraryOptions
 OURS = (
     *((f".{ENDINGS[kind]}", f".{ENDINGS['lights']}") for kind in ("residual", "preview")),
     *((f".{names.map}", f".{names.lights}") for names in EXPORTS.values()),
+    *((".scene.exr", f".{names.scene}") for names in EXPORTS.values()),  # a render of that scene
 )
 """How images end that conversions and exports have written, and what then lies beside them."""
 

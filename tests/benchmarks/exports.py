@@ -23,8 +23,16 @@ from PIL import Image, ImageDraw
 from sunsplit.core import read_skylight
 from sunsplit.core.export.axes import Y_UP, Y_UP_LEFT
 from tests import exports_in_blender, mitsuba_renders, pbrt_files, povray_renders
-from tests.exporting import HEIGHT, WIDTH, Reference, converted, exported, reference
-from tests.exporting import shift_of_shadows as shift_of
+from tests.exporting import (
+    HEIGHT,
+    WIDTH,
+    Reference,
+    Shadows,
+    converted,
+    exported,
+    reference,
+    shadows_of,
+)
 from tests.plates import ALBEDO, ORIENTATIONS, irradiance, unit
 
 
@@ -82,14 +90,14 @@ RENDERERS = (
 @dataclass(frozen=True, eq=False)
 class Row:
     """Of a map and a renderer. means: of each channel, relative to Cycles' under the HDRI, (3,);
-    shift: of shadows, pixels. plates: of each, the worst channel, relative to the plate's own
+    plates: of each, the worst channel, relative to the plate's own
     (first) and to the mean of all eight (second), (8, 2). seconds: of the export alone."""
 
     map: str
     renderer: Renderer
     lamps: int
     means: np.ndarray | None
-    shift: float | None
+    shadows: Shadows | None
     plates: np.ndarray
     seconds: float
     picture: np.ndarray | None
@@ -145,18 +153,24 @@ def _row(
     if found is None:
         return Row(name, renderer, lamps, None, None, plates, seconds, None)
     means = found.mean(axis=(0, 1)) / wanted.picture.mean.mean(axis=(0, 1)) - 1
-    shift = shift_of(wanted, found)
-    return Row(name, renderer, lamps, means, shift, plates, seconds, found)
+    shadows = shadows_of(wanted, found)
+    return Row(name, renderer, lamps, means, shadows, plates, seconds, found)
 
 
 def _line(row: Row) -> str:
     means = " | ".join(f"{100 * m:+.2f}" for m in row.means) if row.means is not None else " | | "
-    shift = "" if row.shift is None else f"{row.shift:.2f}"
+    shadows = " | " if row.shadows is None else _shadows(row.shadows)
     own, all_plates = 100 * row.plates.max(axis=0)
     return (
-        f"| {row.map} | {row.lamps} | {row.renderer.title} | {means} | {shift} | {own:.2f} | "
+        f"| {row.map} | {row.lamps} | {row.renderer.title} | {means} | {shadows} | {own:.2f} | "
         f"{all_plates:.2f} | {row.seconds:.1f} |"
     )
+
+
+def _shadows(shadows: Shadows) -> str:
+    if np.isnan(shadows.shift):
+        return "no edges | "
+    return f"{shadows.shift:.2f} | {shadows.likeness:.3f}"
 
 
 def table(rows: Sequence[Row], options: Sequence[str]) -> str:
@@ -167,13 +181,14 @@ def table(rows: Sequence[Row], options: Sequence[str]) -> str:
         "Made by `python -m tests.benchmarks.exports`. The scene that comes with every export, "
         f"{WIDTH} x {HEIGHT} pixels, and a white plate that faces eight ways, against Cycles under "
         f"the plain HDRI (plates: in closed form). Conversions {how}. "
-        "In percent; *shadows*: how many pixels they lie elsewhere at most; *worst plate*: of the "
+        "In percent; *shadows*: how many pixels they lie elsewhere at most, and how like they are, "
+        "a correlation, in the window of sixteen where that is worst; *worst plate*: of the "
         "worst channel, relative to that plate, and to the mean of the eight (a dark plate's own "
         "light is a hundredth of it); seconds of the command that exports, start of Python "
         "included.\n\n"
-        "| map | suns | by | red | green | blue | shadows | worst plate | of the mean | "
-        "export, s |\n"
-        "| --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n"
+        "| map | suns | by | red | green | blue | shadows, pixels | likeness | worst plate | "
+        "of the mean | export, s |\n"
+        "| --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n"
     )
     return head + "\n".join(map(_line, rows)) + "\n"
 

@@ -268,7 +268,7 @@ def test_exports(tmp_path, sunrise):
         if row.picture is not None:
             # Too few samples for more: what is looked for is light that is missing or twice there.
             assert np.abs(row.means).max() < 0.05
-            assert row.shift < 2
+            assert row.shadows.shift < 2
     lines = (tmp_path / "exports.md").read_text().splitlines()
     assert sum(line.startswith("| spruit_sunrise_1k") for line in lines) == len(rows)
     assert (tmp_path / "exports.jpg").stat().st_size > 10_000

@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 from sunsplit.core import (
     ConversionSettings,
     ExportSettings,
-    SunsplitError,
     convert,
     export_conversion,
     load,
@@ -141,6 +140,19 @@ def test_a_painted_disc_is_where_and_as_wide_as_the_sun(to_light, diameter):
     assert mean == pytest.approx(length * given.to_light, abs=2e-4)
     inside = look_up(painted, given.to_light[None], True)
     assert inside == pytest.approx(given.radiance[None], rel=5e-3)
+
+
+@pytest.mark.parametrize("diameter", [1e-4, 0.01, 0.03, 0.1, 0.4])
+def test_discs_narrower_than_pixels_are_painted(diameter):
+    """Wherever they lie between the places that are looked at."""
+    places = np.random.default_rng(5).normal(size=(40, 3))
+    places = np.vstack([places / np.linalg.norm(places, axis=1)[:, None], np.eye(3), -np.eye(3)])
+    for place in places:
+        given = sun(diameter, place)
+        painted = with_suns(None, [given], np.eye(3), False)
+        assert scalar_irradiance(painted) == pytest.approx(given.scalar_irradiance, rel=1e-6)
+        found = sphere.pixel_centres(np.flatnonzero(painted[..., 0].ravel()), 1024, 512)
+        assert sphere.angle_between(found, place).max() < np.radians(diameter / 2 + 0.36)
 
 
 def test_the_rim_of_a_painted_disc_is_not_jagged():
@@ -270,7 +282,9 @@ def test_an_older_map_goes_away(tmp_path, conversion):
     assert first.lights.is_file()
 
 
-@pytest.mark.parametrize("name", ['a "quoted" sky', "Himmel über Köln", "a -- b", "a&b<c>"])
+@pytest.mark.parametrize(
+    "name", ['a "quoted" sky', "Himmel über Köln", "a -- b", "a---b-", "a&b<c>"]
+)
 def test_any_name_in_xml(tmp_path, name):
     export_conversion(
         replace(sky(sun(1), radiance=noise(8)), name=name), tmp_path, ExportSettings("mitsuba")
@@ -279,6 +293,26 @@ def test_any_name_in_xml(tmp_path, name):
     lights = scene.find("include").get("filename")
     found = ElementTree.parse(tmp_path / lights).getroot()
     assert (tmp_path / found.find("emitter/string").get("value")).is_file()
+
+
+@pytest.mark.parametrize("name", ["a\nb", "a\x01b", "a\udcffb"])
+@pytest.mark.parametrize("kind", ["pbrt", "mitsuba"])
+def test_names_that_no_text_can_hold(tmp_path, kind, name):
+    with pytest.raises(UnusableInput, match="cannot refer to files named"):
+        export_conversion(replace(sky(sun(1)), name=name), tmp_path, ExportSettings(kind))
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("kind", ["pbrt", "mitsuba", "povray", "usd", "gltf"])
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -1.0])
+def test_what_is_no_light(tmp_path, kind, wrong):
+    dark = sky(sun(1, flux=(1, wrong, 1)))
+    spot = noise(8)
+    spot[2, 3, 1] = wrong
+    for wrong_sky in (dark, sky(radiance=spot)):
+        with pytest.raises(UnusableInput, match="The light of sky is"):
+            export_conversion(wrong_sky, tmp_path, ExportSettings(kind))
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
@@ -394,7 +428,3 @@ def test_the_command_line_s_sentences(tmp_path, arguments, status, sentence):
     assert sentence in result.stderr
     assert "Traceback" not in result.stderr
     assert not list(tmp_path.iterdir())
-
-
-def test_errors_are_ours():
-    assert issubclass(BadSetting, ValueError | SunsplitError)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...version import version
+from ..names import shown
 
 Floats = NDArray[np.float64]
 Json = dict[str, Any]
@@ -98,11 +99,6 @@ class Document:
 def data_uri(media_type: str, content: bytes) -> str:
     """Content as an address that holds it."""
     return f"data:{media_type};base64,{b64encode(content).decode('ascii')}"
-
-
-def shown(name: str) -> str:
-    """A name as text: bytes of a file's name that are none are spelt out."""
-    return name.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def numbers_of(values: Floats) -> list[float]:

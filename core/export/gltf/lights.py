@@ -44,6 +44,12 @@ MAP_IN_VIEWERS = (
     "all: other programs need the file beside."
 )
 
+TWICE = (
+    "Babylon.js, as of version 9, lights matt surfaces with the map {:.3g} times too bright: for "
+    "it, write 1 lux for a unit of irradiance."
+)
+"""It multiplies the map's irradiance by the light's intensity once too often."""
+
 
 def made_for_gltf(sky: Skylight, settings: ExportSettings) -> Made:
     """Y up, as glTF is by its own rules."""
@@ -51,10 +57,12 @@ def made_for_gltf(sky: Skylight, settings: ExportSettings) -> Made:
     emitters = emitters_of(sky, "one ray", settings.discs, WIDE_SUN)
     names = names_of("gltf", sky.name)
     losses = emitters.losses + ([MAP_IN_VIEWERS] if emitters.radiance is not None else [])
+    light = image_based_light(emitters, axes, lux)
+    if light and light.intensity != 1:
+        losses.append(TWICE.format(light.intensity))
     extras = {"lux": lux, "lux_means": LUX, "losses": losses}
     if emitters.radiance is not None:
         extras["map"] = _about_map(emitters, axes, names.map)
-    light = image_based_light(emitters, axes, lux)
     lights, scene = (_with_light(emitters, axes, lux, extras, light) for _ in range(2))
     add_stage(scene, STAGE, axes)
     return Made(names, lights.text(), scene.text(), emitters.radiance, axes, tuple(losses))
