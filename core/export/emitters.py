@@ -56,13 +56,15 @@ class Emitters:
         lines = []
         if many := [rays for rays in self.rays if len(rays.to_light) > 1]:
             lines.append(
-                f"{_suns(len(many))} parallel lights, {len(many[0].to_light)} each: shadows fade "
-                "in so many steps, and mirrors do not show them."
+                f"Suns that are {len(many[0].to_light)} parallel lights each: {len(many)}. Their "
+                "shadows fade in so many steps, and mirrors do not show them."
             )
         if points := [rays for rays in self.rays if len(rays.to_light) == 1 and rays.width]:
-            lines.append(f"{_suns(len(points))} lights of no width: their shadows are sharp.")
+            lines.append(
+                f"Suns that have lost their width: {len(points)}. Their shadows are sharp."
+            )
         if self.painted:
-            lines.append(f"{_suns(self.painted)} in the map, and cannot be changed by themselves.")
+            lines.append(f"Suns in the map: {self.painted}. They cannot be changed by themselves.")
         return lines
 
 
@@ -186,7 +188,3 @@ def _covered(row: int, centre: Floats, half_angle: float, width: int, height: in
     inside = sphere.angle_between(sphere.to_directions(u, (row + steps) / height), centre)
     covered[rim] = (inside < half_angle).mean(axis=(1, 2))
     return covered
-
-
-def _suns(count: int) -> str:
-    return "1 sun is" if count == 1 else f"{count} suns are"

@@ -96,9 +96,9 @@ def test_what_becomes_of_suns():
 def test_losses_are_said():
     many = emitters_of(sky(sun(0.5), sun(20)), "many rays", "auto").losses
     assert any("61" in line for line in many)
-    assert any("in the map" in line for line in many)
+    assert any("Suns in the map: 1." in line for line in many)
     (sharp,) = emitters_of(sky(sun(0), sun(0.5)), "one ray", "auto").losses
-    assert sharp.startswith("1 sun is")
+    assert sharp.startswith("Suns that have lost their width: 1.")
     assert not emitters_of(sky(sun(0)), "many rays", "auto").losses
 
 
@@ -403,7 +403,7 @@ def test_the_command_line(tmp_path, written):
     result = sunsplit("export", written, "--format", "mitsuba", "-o", tmp_path / "out")
     assert result.returncode == 0, result.stderr
     assert "axes: right-handed, Y up" in result.stdout
-    assert "in the map" in result.stdout
+    assert "Suns in the map: 2." in result.stdout
     result = sunsplit(
         "export", written, "--format", "pbrt", "-o", tmp_path, "--json", "--discs", "lights"
     )

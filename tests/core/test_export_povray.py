@@ -114,7 +114,7 @@ def test_wide_suns_are_painted(tmp_path):
     wide, narrow = sun(np.degrees(WIDE_DISC) + 0.1), sun(np.degrees(WIDE_DISC) - 0.1)
     files = export_conversion(sky(wide, narrow), tmp_path, ExportSettings("povray"))
     assert files.lights.read_text().count("light_source") == 1
-    assert any("1 sun is in the map" in line for line in files.losses)
+    assert any("Suns in the map: 1." in line for line in files.losses)
     assert any("17 x 17" in line for line in files.losses)
     assert any("radiosity" in line for line in files.losses)
 
