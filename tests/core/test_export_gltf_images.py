@@ -72,7 +72,7 @@ def irradiance_of(light: dict, normals: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("lux", [1.0, 683.0])
 def test_irradiance_of_a_map_of_degree_two_is_exact(tmp_path, turn, lux):
     x, y, z = np.moveaxis(directions_of(128), -1, 0)
-    colours = [2 + x + 0.5 * y * z, 1.5 - y + 0.7 * (x * x - y * y), 3 + z * x - 0.4 * z * z]
+    colours = [2 + x + 0.5 * y * z, 2.5 - y + 0.7 * (x * x - y * y), 3 + z * x - 0.4 * z * z]
     radiance = np.stack(colours, axis=-1).astype(np.float32)
     light, _ = light_of(radiance, tmp_path, turn, lux)
     turn = np.eye(3) if turn is None else turn
