@@ -69,7 +69,7 @@ def test_things_are_the_stages(tmp_path, lights):
 
 @pytest.fixture(scope="module")
 def wanted(sunrise, tmp_path_factory):
-    return reference(sunrise, tmp_path_factory.mktemp("reference"), samples=48)
+    return reference(sunrise, tmp_path_factory.mktemp("reference"))
 
 
 @pytest.mark.parametrize("options", [(), ("--discs", "map")])

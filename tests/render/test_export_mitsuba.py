@@ -40,7 +40,7 @@ def test_the_scene_that_comes_with_it(tmp_path, sunrise, wanted, options):
     folder = exported(lights, tmp_path / "mitsuba", "mitsuba", *options)
     scene = folder / f"{sunrise.stem}.scene.xml"
     height, width = wanted.ground.shape
-    found = estimate_of([picture(scene, width, height, 64, seed) for seed in range(4)])
+    found = estimate_of([picture(scene, width, height, 48, seed) for seed in range(4)])
     means_agree(wanted.picture, found, tmp_path, MEAN)
     pixels_agree(wanted.picture, found, tmp_path, slack=0.05, outliers=0.02)
     shadows_agree(wanted, found.mean)

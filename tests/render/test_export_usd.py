@@ -141,7 +141,7 @@ def test_the_scene_that_comes_with_it(tmp_path, sunrise, wanted, up):
     folder = exported(lights, tmp_path / "usd", "usd", "--up", up, "--reader", "blender")
     scene = usd_scene(folder / f"{sunrise.stem}.scene.usda")
     look_at_stage(scene)
-    found = estimate(scene, tmp_path, 128)
+    found = estimate(scene, tmp_path, 64)
     means_agree(wanted.picture, found, tmp_path, MEAN)
     pixels_agree(wanted.picture, found, tmp_path, slack=0.05, outliers=0.02)
     shadows_agree(wanted, found.mean)
