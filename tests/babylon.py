@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from sunsplit.core import sphere
 from sunsplit.core.export.axes import Y_UP
@@ -15,6 +14,7 @@ from sunsplit.core.export.gltf.document import data_uri, quaternion
 from sunsplit.core.export.stage import Ball, mesh_of
 from tests.browser import browser, chromium
 from tests.gltf_validator import PACKAGES
+from tests.installed import not_installed
 
 SCRIPTS = ("babylonjs/babylon.js", "babylonjs-loaders/babylonjs.loaders.min.js")
 
@@ -57,7 +57,7 @@ def seen_on_a_ball(lights: Path, ways: np.ndarray, surface: dict[str, float]) ->
     """
     scripts = [PACKAGES / script for script in SCRIPTS]
     if not chromium() or not all(script.is_file() for script in scripts):
-        pytest.skip("Chromium or the npm packages babylonjs and babylonjs-loaders are missing.")
+        not_installed("Chromium or the npm packages babylonjs and babylonjs-loaders are missing.")
     document = json.loads(lights.read_text(encoding="utf-8"))
     _add_ball(document, surface)
     for number, way in enumerate(ways):

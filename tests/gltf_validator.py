@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-import pytest
+from tests.installed import not_installed
 
 PACKAGES = Path(__file__).parents[1] / ".tools" / "node" / "node_modules"
 """Where `npm install --prefix .tools/node gltf-validator@2.0.0-dev.3.10` puts it."""
@@ -27,7 +27,7 @@ def validated(path: Path) -> dict[str, Any]:
     """The validator's report about a file. Skips the test where the validator is not installed."""
     node, package = shutil.which("node"), PACKAGES / "gltf-validator"
     if not node or not package.is_dir():
-        pytest.skip("Node.js or the npm package gltf-validator is not installed.")
+        not_installed("Node.js or the npm package gltf-validator is not installed.")
     command = [node, "-e", SCRIPT, str(package), str(path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     return json.loads(done.stdout)
