@@ -333,6 +333,9 @@ class SunsplitSettings(bpy.types.PropertyGroup):
             type=bpy.types.Collection, name="Suns", description="What holds the lamps"
         ),
         "lamps": CollectionProperty(type=SunsplitLamp),
+        "portals": PointerProperty(
+            type=bpy.types.Collection, name="Portals", description="What shows Cycles the openings"
+        ),
         "sky": PointerProperty(
             type=bpy.types.Object, name="Sky", description="What turns the lamps with the world"
         ),

@@ -58,11 +58,13 @@ SOLID = {"MESH", "EMPTY", "LIGHT", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "
 
 @dataclass(frozen=True)
 class Sight:
-    """A scene to cast rays through. see_through: objects that let light through, by name."""
+    """A scene to cast rays through. see_through: objects that let light through, by name.
+    shadowless: those of them that let it through straight."""
 
     scene: bpy.types.Scene
     graph: bpy.types.Depsgraph
     see_through: frozenset[str]
+    shadowless: frozenset[str] = frozenset()
 
     def camera_sees_world(self) -> bool:
         """Whether any ray through a grid over the picture leaves the scene."""
@@ -101,6 +103,17 @@ class Sight:
             start = back.point
         return None
 
+    def is_open(self, start: Vector, direction: Vector) -> bool:
+        """Whether light comes straight from a direction."""
+        for _ in range(STEPS):
+            hit, point, _, _, thing, _ = self.scene.ray_cast(self.graph, start, direction)
+            if not hit:
+                return True
+            if thing.name not in self.shadowless and not thing.hide_render:
+                return False
+            start = point + direction * max(OFF * (point - start).length, 1e-6)
+        return False
+
 
 @dataclass(frozen=True)
 class Place:
@@ -113,11 +126,14 @@ class Place:
 @dataclass(frozen=True)
 class Reach:
     """Places that light to the camera comes from, and directions of rays from there to the world,
-    in the scene's axes. More places are found when they are asked for; always the same."""
+    in the scene's axes, with the number of the place; met: what others have met. More places are
+    found when they are asked for; always the same."""
 
     sight: Sight
     places: list[Place] = field(default_factory=list)
     escaped: list[Vector] = field(default_factory=list)
+    started: list[int] = field(default_factory=list)
+    met: list[Place] = field(default_factory=list)
     random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
 
     @classmethod
@@ -127,7 +143,7 @@ class Reach:
         for _ in range(PATHS):
             if len(found.places) >= PLACES:
                 break
-            found._follow_another()
+            found.follow_another()
             yield
         return found
 
@@ -146,7 +162,7 @@ class Reach:
         for _ in range(count):  # a path that meets nothing finds no place
             if len(self.places) >= count:
                 break
-            self._follow_another()
+            self.follow_another()
             yield
         if len(self.places) < count:
             return True  # it cannot be told
@@ -157,7 +173,7 @@ class Reach:
             yield
         return False
 
-    def _follow_another(self) -> None:
+    def follow_another(self) -> None:
         """A path from the camera, through another point of its picture."""
         camera = self.sight.scene.camera
         direction = _through_picture(self.sight.scene, *self.random.random(2))
@@ -182,6 +198,9 @@ class Reach:
             found = self.sight.cast(place.point, direction)
             if found is None:
                 self.escaped.append(direction)
+                self.started.append(len(self.places) - 1)
+            else:
+                self.met.append(found)
             last = found or last
         return last
 

@@ -91,3 +91,17 @@ def skipped_sentences(
     if tree_off:
         lines.append(said("Skipped: the light tree, as the lamps are cheaper without and alone."))
     return lines
+
+
+def portal_sentences(count: int) -> list[str]:
+    """count: of openings that were found and got a portal."""
+    if not count:
+        return []
+    if count == 1:
+        return [
+            said("Light comes in through 1 opening: a portal tells Cycles where to look for it.")
+        ]
+    text = said(
+        "Light comes in through {count} openings: portals tell Cycles where to look for it."
+    )
+    return [text.format(count=count)]

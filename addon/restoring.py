@@ -7,6 +7,7 @@ import bpy
 from . import eevee, passes
 from .lamps import remove_lamps, unlink_lamps
 from .light_groups import remove_groups
+from .portals import remove_portals
 from .rig import remove_rig, rig_of
 from .skies import SUNS
 from .world import remove_converted, unconverted
@@ -31,8 +32,9 @@ def restore_scene(scene: bpy.types.Scene) -> None:
     passes.remove_suns_layer(scene)
     eevee.take_back(scene)
     remove_groups(scene.view_layers)
-    sky = state.sky
+    sky, portals = state.sky, state.portals
     _forget(state)
+    remove_portals(scene, portals)
     if state.light_tree_off and hasattr(scene, "cycles"):
         scene.cycles.use_light_tree = True
     state.light_tree_off = False
@@ -52,6 +54,7 @@ def restore_scene(scene: bpy.types.Scene) -> None:
 def _forget(state: bpy.types.PropertyGroup) -> None:
     """What a scene knows of its conversion."""
     state.original_world = state.converted_world = state.collection = state.sky = None
+    state.portals = None
     state.lamps.clear()
     state.report = state.outlines = ""
 

@@ -11,10 +11,11 @@ import bpy
 from ..core.conversion import Conversion
 from ..core.environment import LUMINANCE_WEIGHTS, EnvironmentMap
 from ..core.errors import UnusableInput
+from ..core.openings import Opening
 from ..core.outlines import outlines_of
 from ..core.passes import parts_of, samples_of_passes
 from ..core.progress import Progress, silent
-from ..core.sampling import choose_sampling, needs_light_tree
+from ..core.sampling import BY_PORTALS, WorldSampling, choose_sampling, needs_light_tree
 from ..core.settings import ConversionSettings
 from ..core.visible import VisiblePart, visible_part
 from . import eevee, passes
@@ -33,8 +34,9 @@ from .known import known_conversion
 from .lamps import collection_of, make_lamps, name_lamps
 from .light_groups import put_into_groups
 from .options import SceneOptions
+from .portals import find_portals, has_portals, make_portals
 from .rays import Reach
-from .report import headline, made_sentences, skipped_sentences
+from .report import headline, made_sentences, portal_sentences, skipped_sentences
 from .restoring import restore_scene, swap_overrides
 from .rig import Rig, make_rig, rig_of
 from .scene_needs import ALL, SceneNeeds, needs_of
@@ -50,6 +52,15 @@ from .world import (
 
 MADE = 0.9
 """Of the time of a conversion, about, until its maps are written."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """What a scene is to get. images: of the maps that its world shows, by what they are."""
+
+    conversion: Conversion
+    images: Mapping[str, bpy.types.Image]
+    openings: tuple[Opening, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,15 +104,18 @@ def conversion_steps(
     needs = found if options.skips else ALL
     environment = yield from read_image(light.image)
     needed = _without_excess(settings, environment.own_width, needs)
-    visible = yield from _what_is_visible(scene, environment, needed, needs, light)
+    reach = yield from _reach(scene, needs)
+    visible = yield from _what_is_visible(reach, environment, needed, light)
     conversion = yield Apart(
         lambda listen, _: known_conversion(environment, needed, visible, listen), READ, MADE
     )
+    openings = yield from _openings(scene, reach, conversion, light)
     with folder_for_maps() as folder:
         paths = yield Apart(lambda *_: _write_maps(folder, conversion, needs), MADE, 1)
         outlines = yield Apart(lambda *_: outlines_of(conversion).to_text(), 1, 1)
         images = {path.stem: packed_image(path) for path in paths}
-    result = _replace(scene, light, conversion, images, settings, options, found)
+    made = _Made(conversion, images, openings)
+    result = _replace(scene, light, made, settings, options, found)
     scene.sunsplit.outlines = outlines
     return result
 
@@ -124,24 +138,45 @@ def _is_converted(scene: bpy.types.Scene) -> bool:
     return scene.world == state.converted_world and state.original_world is not None
 
 
+def _reach(scene: bpy.types.Scene, needs: SceneNeeds) -> Steps[Reach | None]:
+    """What light can reach; None where rays do not tell. EEVEE's world shines through everything:
+    there, what is left in it would do harm."""
+    if needs.sight is None or scene.render.engine != "CYCLES":
+        return None
+    return (yield from Reach.steps(needs.sight))
+
+
 def _what_is_visible(
-    scene: bpy.types.Scene,
+    reach: Reach | None,
     environment: EnvironmentMap,
     settings: ConversionSettings,
-    needs: SceneNeeds,
     light: WorldLight,
 ) -> Steps[VisiblePart | None]:
-    # EEVEE's world shines through everything: there, what is left in it would do harm.
-    if not (needs.sight and settings.chooses_border and scene.render.engine == "CYCLES"):
+    # Where the world is animated, what is hidden now may come round.
+    if reach is None or not settings.chooses_border or is_animated(light, ()):
         return None
-    if is_animated(light, ()):  # what is hidden now may come round
-        return None
-    reach = yield from Reach.steps(needs.sight)
     to_map = light.map_from_world
     return (
         yield Apart(
             lambda _, in_main: visible_part(environment, reach.looks(to_map, in_main)), READ, READ
         )
+    )
+
+
+def _openings(
+    scene: bpy.types.Scene, reach: Reach | None, conversion: Conversion, light: WorldLight
+) -> Steps[tuple[Opening, ...]]:
+    """Where portals help Cycles; none where the user has made some."""
+    if reach is None or conversion.residual is None or has_portals(scene):
+        return ()
+    has_table = _sampling(conversion).method != "NONE"
+    return (yield from find_portals(reach, conversion, light.map_from_world, has_table))
+
+
+def _sampling(conversion: Conversion) -> WorldSampling:
+    has_cells = conversion.settings.residual == "voronoi"
+    return choose_sampling(
+        conversion.residual, conversion.visible_share, has_cells, conversion.visible
     )
 
 
@@ -161,8 +196,7 @@ def _write_maps(folder: Path, conversion: Conversion, needs: SceneNeeds) -> list
 def _replace(
     scene: bpy.types.Scene,
     light: WorldLight,
-    conversion: Conversion,
-    images: Mapping[str, bpy.types.Image],
+    made: _Made,
     settings: ConversionSettings,
     options: SceneOptions,
     found: SceneNeeds,
@@ -172,16 +206,16 @@ def _replace(
     state, world = scene.sunsplit, scene.world
     needs = found if options.skips else ALL
     original = state.original_world if _is_converted(scene) else world
-    tree_off = _is_without_light_tree(scene, conversion, needs)
+    conversion, openings = made.conversion, made.openings
+    # With portals the world is a light to choose, too, and not like the lamps.
+    tree_off = not openings and _is_without_light_tree(scene, conversion, needs)
     has_cells = conversion.settings.residual == "voronoi"
-    sampling = choose_sampling(
-        conversion.residual, conversion.visible_share, has_cells, conversion.visible
-    )
+    sampling = BY_PORTALS if openings else _sampling(conversion)
     sees_it = needs.camera_sees_world
     try:
-        new = converted_world(world, light, images, sampling, has_cells, sees_it)
+        new = converted_world(world, light, made.images, sampling, has_cells, sees_it)
     finally:
-        remove_images(images)
+        remove_images(made.images)
     light = find_light(new, scene.render.engine)  # the same, in the new world
     rig = make_rig(light.texture)
     keep_factors(state.sky, rig.sky)
@@ -189,6 +223,7 @@ def _replace(
     sentences = [
         *made_sentences(conversion),
         *skipped_sentences(conversion, settings, needs, tree_off),
+        *portal_sentences(len(openings)),
         *_warnings(scene, (world, original), light, [*rig_of(rig.sky), *lamps]),
     ]
     for_eevee = settings.in_eevee or "EEVEE" in scene.render.engine
@@ -197,6 +232,7 @@ def _replace(
     restore_scene(scene)
     name_images(new, conversion.environment.name)
     result = _install(scene, original, conversion, new, rig, lamps)
+    state.portals = make_portals(scene, openings)
     if tree_off:
         scene.cycles.use_light_tree, state.light_tree_off = False, True
     if for_eevee:

@@ -60,7 +60,9 @@ ALL = SceneNeeds(camera_sees_world=True, mirrors=True, other_lights=True)
 
 def needs_of(scene: bpy.types.Scene) -> SceneNeeds:
     """Look at a scene: its camera, lamps, materials and shapes."""
-    own = {entry.lamp for entry in scene.sunsplit.lamps} | set(rig_of(scene.sunsplit.sky))
+    state = scene.sunsplit
+    own = {entry.lamp for entry in state.lamps} | set(rig_of(state.sky))
+    own |= set(state.portals.objects) if state.portals else set()
     shown = list(_shown(thing for thing in scene.objects if thing not in own))
     trees = _trees(scene, shown)
     nodes = [node for tree in trees for node in _nodes(tree)]
@@ -84,8 +86,13 @@ def _sight(scene: bpy.types.Scene, shown: list[bpy.types.Object]) -> Sight | Non
     graph = bpy.context.evaluated_depsgraph_get()
     if graph.scene != scene:
         return None
-    clear = {thing.name for thing in shown if _lets_light_through(thing)}
-    return Sight(scene, graph, frozenset(clear))
+    clear = [thing for thing in shown if _lets_light_through(thing)]
+    straight = [thing for thing in clear if _is_shadowless(thing)]
+    return Sight(scene, graph, _names(clear), _names(straight))
+
+
+def _names(things: list[bpy.types.Object]) -> frozenset[str]:
+    return frozenset(thing.name for thing in things)
 
 
 def _is_told_by_rays(
@@ -103,6 +110,14 @@ def _lets_light_through(thing: bpy.types.Object) -> bool:
         return True
     trees = [s.material.node_tree for s in thing.material_slots if s.material]
     return any(_is_translucent(node) for tree in trees if tree for node in _nodes(tree))
+
+
+def _is_shadowless(thing: bpy.types.Object) -> bool:
+    """Whether light passes a thing that lets it through without being bent."""
+    if thing.type == "MESH" and not thing.visible_shadow:
+        return True
+    trees = [s.material.node_tree for s in thing.material_slots if s.material]
+    return any(_is_seen_through(node) for tree in trees if tree for node in _nodes(tree))
 
 
 def _is_translucent(node: bpy.types.Node) -> bool:

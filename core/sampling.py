@@ -49,6 +49,10 @@ class WorldSampling:
     resolution: int = SMALL_TABLE
 
 
+BY_PORTALS = WorldSampling("NONE")
+"""Where a scene's openings have portals: each is looked for through these only."""
+
+
 def choose_sampling(
     residual: NDArray[np.float32] | None,
     share: float,

@@ -1,0 +1,274 @@
+"""Openings that light comes into a closed scene through: windows, doors, a missing wall.
+
+A path tracer that looks for the sky from inside finds it once in many tries, as a window is a small
+part of all directions. If it knows the openings it looks nowhere else.
+
+They are found by rays from the surfaces that matter: whatever gets out crosses the plane of an
+opening within a rectangle, and no plane is crossed more narrowly. Planes that may be that are those
+of walls, which a window lies in, and the sides of the box around all that was met, where a wall is
+missing. An opening that is found too small or too large costs noise and changes no light.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+MOST = 8
+"""More openings than these are not looked for: each sample tries one of them, drawn by lot."""
+
+FEWEST = 12
+"""Rays that get out, from which on openings can be told."""
+
+FEWEST_EACH, EACH = 3, 0.04
+"""Of them through each opening, and as a part of all: less is a crack."""
+
+COVERED = 0.9
+"""Of the rays that get out from inside: if openings have less, they are not all there is."""
+
+WIDEST = 0.25
+"""Of the looks from inside: where more get out, rays find the sky by themselves."""
+
+INSIDE = 0.5
+"""Of the places that matter: where fewer are inside, it is another scene that the picture shows."""
+
+FLAT = np.cos(np.radians(2))
+"""Surfaces whose normals are nearer to each other than 2 degrees may lie in one plane."""
+
+THIN = 2e-3
+"""Of the scene's size: surfaces within so much of a plane lie in it."""
+
+LARGE = 0.02
+"""Of all surfaces that were met: a plane with fewer of them is no direction that a room has."""
+
+APART = 3.0
+"""Openings in one wall are two where nothing between them is crossed over so many mean distances
+of crossings."""
+
+WIDER = 1.3
+"""So much larger than its crossings is the rectangle in which an opening's edges are looked for."""
+
+TARGETS = 256
+"""Rays that look for the edges of an opening."""
+
+GROWTHS, GROWN = 4, 1.1
+"""So often are they looked for again, where an opening turned out by so much larger."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inside:
+    """What rays from the surfaces that matter have met.
+
+    places: where they started, (p, 3), each as many, `looks`. escaped: directions of those that got
+    out straight, (n, 3), and started: the place of each, (n,). points, normals: of surfaces that
+    the others met, (m, 3), normals to the ray's side. is_open: whether one gets out from a place,
+    (3,), in a direction, (3,).
+    """
+
+    places: Floats
+    looks: int
+    escaped: Floats
+    started: NDArray[np.intp]
+    points: Floats
+    normals: Floats
+    is_open: Callable[[Floats, Floats], bool]
+
+
+@dataclass(frozen=True, eq=False)
+class Opening:
+    """A rectangle. centre: (3,). across, up, inwards: orthonormal, (3,). width: along `across`."""
+
+    centre: Floats
+    across: Floats
+    up: Floats
+    inwards: Floats
+    width: float
+    height: float
+
+    def is_before(self, points: Floats) -> NDArray[np.bool_]:
+        """Whether points (n, 3) are inside, seen from here."""
+        return (points - self.centre) @ self.inwards > 0
+
+    def is_crossed(self, starts: Floats, directions: Floats) -> NDArray[np.bool_]:
+        """Whether rays (n, 3) go out through here."""
+        along, out = _crossings(self.inwards, self.inwards @ self.centre, starts, directions)
+        local = starts + along[:, None] * directions - self.centre
+        within = np.abs(local @ self.across) <= self.width / 2
+        return out & within & (np.abs(local @ self.up) <= self.height / 2)
+
+
+@dataclass(frozen=True, eq=False)
+class _Plane:
+    """inwards: unit normal, (3,). offset: of the plane along it."""
+
+    inwards: Floats
+    offset: float
+
+
+def find_openings(inside: Inside) -> tuple[Opening, ...]:
+    """The openings of a closed scene, the most important first; none where it is not closed, or
+    where some of what gets out is not explained by them."""
+    if len(inside.escaped) < FEWEST:
+        return ()
+    starts = inside.places[inside.started]
+    planes, axes = _planes(inside)
+    left = np.ones(len(starts), bool)
+    found: list[Opening] = []
+    while len(found) < MOST and left.mean() > 1 - COVERED:
+        more = _through_one_plane(inside, planes, axes, left)[: MOST - len(found)]
+        if not more:
+            break
+        for opening in more:
+            left &= opening.is_before(starts) & ~opening.is_crossed(starts, inside.escaped)
+        found += more
+    return tuple(found) if found and _is_closed(inside, found) else ()
+
+
+def _is_closed(inside: Inside, found: list[Opening]) -> bool:
+    """Whether openings are all there is, for those places that are inside of them."""
+    starts = inside.places[inside.started]
+    through = np.any([each.is_crossed(starts, inside.escaped) for each in found], axis=0)
+    within = np.all([each.is_before(inside.places) for each in found], axis=0)
+    within[inside.started[through]] = True
+    out = within[inside.started].sum()
+    return bool(
+        through.sum() >= COVERED * out
+        and out <= WIDEST * inside.looks * within.sum()
+        and within.mean() >= INSIDE
+    )
+
+
+def _through_one_plane(
+    inside: Inside, planes: list[_Plane], axes: Floats, left: NDArray[np.bool_]
+) -> list[Opening]:
+    """The openings in the plane that most of the rays that are left cross most narrowly."""
+    starts, directions = inside.places[inside.started][left], inside.escaped[left]
+    fewest = max(FEWEST_EACH, EACH * len(left))
+    best, found = 0.0, []
+    for plane in planes:
+        along, out = _crossings(plane.inwards, plane.offset, starts, directions)
+        if out.sum() < fewest:
+            continue
+        points = (starts + along[:, None] * directions)[out]
+        rectangles = _rectangles(plane, axes, points, fewest)
+        area = sum(each.width * each.height for each in rectangles)
+        count = sum(np.count_nonzero(each.is_crossed(starts, directions)) for each in rectangles)
+        if area > 0 and count**2 / area > best:
+            best, found = count**2 / area, rectangles
+    return [_with_edges(inside, each) for each in found]
+
+
+def _crossings(
+    inwards: Floats, offset: float, starts: Floats, directions: Floats
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """How far along rays (n, 3) a plane is, (n,), and which go out through it."""
+    speed = directions @ inwards
+    out = speed < -1e-9
+    along = (offset - starts @ inwards) / np.where(out, speed, -1.0)
+    return along, out & (along > 0)
+
+
+def _planes(inside: Inside) -> tuple[list[_Plane], Floats]:
+    """Planes that openings may lie in, and the directions that walls look to, (k, 3)."""
+    points, normals = inside.points, inside.normals
+    thin = THIN * float(np.ptp(points, axis=0).max())
+    planes, axes = [], [np.array([0.0, 0.0, 1.0])]
+    rest = np.ones(len(points), bool)
+    while rest.any():
+        first = int(np.argmax(rest))
+        normal, offset = normals[first], points[first] @ normals[first]
+        alike = normals @ normal > FLAT
+        alike &= np.abs(points @ normal - offset) < thin
+        alike[first] = True
+        count = np.count_nonzero(alike & rest)
+        rest &= ~alike
+        if count < FEWEST_EACH:
+            continue
+        planes.append(_Plane(normal, float(offset)))
+        is_new = all(abs(normal @ axis) < FLAT for axis in axes)
+        if is_new and count >= LARGE * len(points):
+            axes.append(normal)
+    for axis in axes:
+        along = points @ axis
+        planes += [_Plane(axis, float(along.min())), _Plane(-axis, float(-along.max()))]
+    return planes, np.array(axes)
+
+
+def _rectangles(plane: _Plane, axes: Floats, points: Floats, fewest: float) -> list[Opening]:
+    """Around points in a plane, (n, 3): as many as there are groups of so many of them."""
+    from scipy.cluster.hierarchy import fcluster, linkage
+
+    frames = list(_frames(plane.inwards, axes))
+    whole = min(
+        (_around(plane.inwards, frame, points) for frame in frames),
+        key=lambda one: one.width * one.height,
+    )
+    near = APART * np.sqrt(whole.width * whole.height / len(points))
+    if near == 0:
+        return []
+    group = fcluster(linkage(points, "single"), near, "distance")
+    counts = np.bincount(group)
+    return [
+        _around(plane.inwards, (whole.across, whole.up), points[group == k])
+        for k in np.argsort(-counts, kind="stable")
+        if counts[k] >= fewest
+    ]
+
+
+def _frames(inwards: Floats, axes: Floats) -> list[tuple[Floats, Floats]]:
+    """(across, up) of rectangles in a plane that have sides along directions that walls have."""
+    frames = []
+    for axis in axes:
+        up = axis - (axis @ inwards) * inwards
+        length = np.linalg.norm(up)
+        if length > 0.1:
+            up = up / length
+            frames.append((np.cross(up, inwards), up))
+    if not frames:
+        up = np.cross(inwards, np.eye(3)[np.argmin(np.abs(inwards))])
+        up /= np.linalg.norm(up)
+        frames.append((np.cross(up, inwards), up))
+    return frames
+
+
+def _around(inwards: Floats, frame: tuple[Floats, Floats], points: Floats) -> Opening:
+    """The rectangle around points (n, 3), by so much larger as n of them do not reach its edges."""
+    across, up = frame
+    middle = points.mean(axis=0)
+    local = (points - middle) @ np.stack(frame, axis=1)
+    low, high = local.min(axis=0), local.max(axis=0)
+    width, height = (high - low) * (1 + 2 / (len(points) + 1))
+    x, y = (low + high) / 2
+    return Opening(middle + x * across + y * up, across, up, inwards, float(width), float(height))
+
+
+def _with_edges(inside: Inside, rough: Opening) -> Opening:
+    """An opening whose edges were looked for, in ever larger rectangles until they are found."""
+    random = np.random.default_rng(0)
+    for _ in range(GROWTHS):
+        targets = _targets(inside, rough, random)
+        if len(targets) < FEWEST_EACH:
+            return rough
+        size = rough.width, rough.height
+        rough = _around(rough.inwards, (rough.across, rough.up), targets)
+        if rough.width < GROWN * size[0] and rough.height < GROWN * size[1]:
+            break
+    return rough
+
+
+def _targets(inside: Inside, rough: Opening, random: np.random.Generator) -> Floats:
+    """Points that light comes in through, (n, 3), in and around an opening."""
+    before = np.flatnonzero(rough.is_before(inside.places))
+    x, y = WIDER * (random.random((2, TARGETS)) - 0.5)
+    targets = rough.centre + np.outer(x * rough.width, rough.across)
+    targets += np.outer(y * rough.height, rough.up)
+    starts = inside.places[random.choice(before, TARGETS)]
+    away = targets - starts
+    away /= np.linalg.norm(away, axis=1)[:, None]
+    rays = zip(starts, away, strict=True)
+    return targets[np.array([inside.is_open(*ray) for ray in rays])]
