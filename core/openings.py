@@ -12,7 +12,7 @@ missing. An opening that is found too small or too large costs noise and changes
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,9 @@ MOST = 8
 
 FEWEST = 12
 """Rays that get out, from which on openings can be told."""
+
+MOST_RAYS = 300
+"""Of them are looked at: more say little more."""
 
 FEWEST_EACH, EACH = 3, 0.04
 """Of them through each opening, and as a part of all: less is a crack."""
@@ -43,12 +46,16 @@ FLAT = np.cos(np.radians(2))
 THIN = 2e-3
 """Of the scene's size: surfaces within so much of a plane lie in it."""
 
+MOST_PLANES = 30
+"""Of walls, those that were met most."""
+
 LARGE = 0.02
 """Of all surfaces that were met: a plane with fewer of them is no direction that a room has."""
 
-APART = 3.0
-"""Openings in one wall are two where nothing between them is crossed over so many mean distances
-of crossings."""
+APART = 9.0
+"""Openings in one wall are two where nothing between them is crossed over so many distances of one
+crossing to the next, the lower quartile of these: 2.7 sides of the square that each has for itself
+where they are spread at random."""
 
 WIDER = 1.3
 """So much larger than its crossings is the rectangle in which an opening's edges are looked for."""
@@ -78,6 +85,18 @@ class Inside:
     normals: Floats
     is_open: Callable[[Floats, Floats], bool]
 
+    def thinned(self, count: int) -> Inside:
+        """The same with places that have about so many rays that get out, if there are more."""
+        every = -(-len(self.escaped) // count)
+        chosen = np.arange(0, len(self.places), every)
+        of_chosen = self.started % every == 0
+        return replace(
+            self,
+            places=self.places[chosen],
+            escaped=self.escaped[of_chosen],
+            started=self.started[of_chosen] // every,
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Opening:
@@ -104,28 +123,31 @@ class Opening:
 
 @dataclass(frozen=True, eq=False)
 class _Plane:
-    """inwards: unit normal, (3,). offset: of the plane along it."""
+    """inwards: unit normal, (3,). offset: of the plane along it. surfaces: that were met in it."""
 
     inwards: Floats
     offset: float
+    surfaces: int = 0
 
 
 def find_openings(inside: Inside) -> tuple[Opening, ...]:
     """The openings of a closed scene, the most important first; none where it is not closed, or
     where some of what gets out is not explained by them."""
-    if len(inside.escaped) < FEWEST:
+    count, looks = len(inside.escaped), inside.looks * len(inside.places)
+    # At most all looks of the places outside get out, and few of those inside.
+    if not FEWEST <= count <= looks * (1 - INSIDE + INSIDE * WIDEST):
         return ()
+    inside = inside.thinned(MOST_RAYS)
     starts = inside.places[inside.started]
     planes, axes = _planes(inside)
     left = np.ones(len(starts), bool)
     found: list[Opening] = []
     while len(found) < MOST and left.mean() > 1 - COVERED:
-        more = _through_one_plane(inside, planes, axes, left)[: MOST - len(found)]
-        if not more:
+        opening = _through_one_plane(inside, planes, axes, left)
+        if opening is None:
             break
-        for opening in more:
-            left &= opening.is_before(starts) & ~opening.is_crossed(starts, inside.escaped)
-        found += more
+        found.append(opening)
+        left &= opening.is_before(starts) & ~opening.is_crossed(starts, inside.escaped)
     return tuple(found) if found and _is_closed(inside, found) else ()
 
 
@@ -145,22 +167,31 @@ def _is_closed(inside: Inside, found: list[Opening]) -> bool:
 
 def _through_one_plane(
     inside: Inside, planes: list[_Plane], axes: Floats, left: NDArray[np.bool_]
-) -> list[Opening]:
-    """The openings in the plane that most of the rays that are left cross most narrowly."""
+) -> Opening | None:
+    """The main opening in the plane that most of the rays that are left cross most narrowly."""
     starts, directions = inside.places[inside.started][left], inside.escaped[left]
     fewest = max(FEWEST_EACH, EACH * len(left))
-    best, found = 0.0, []
+    best, found = 0.0, None
     for plane in planes:
         along, out = _crossings(plane.inwards, plane.offset, starts, directions)
-        if out.sum() < fewest:
-            continue
         points = (starts + along[:, None] * directions)[out]
+        points = points[_is_within(points, inside.points, axes)]
+        if len(points) < fewest:
+            continue
         rectangles = _rectangles(plane, axes, points, fewest)
         area = sum(each.width * each.height for each in rectangles)
         count = sum(np.count_nonzero(each.is_crossed(starts, directions)) for each in rectangles)
         if area > 0 and count**2 / area > best:
-            best, found = count**2 / area, rectangles
-    return [_with_edges(inside, each) for each in found]
+            best, found = count**2 / area, rectangles[0]
+    return _with_edges(inside, axes, found) if found else None
+
+
+def _is_within(points: Floats, box: Floats, axes: Floats) -> NDArray[np.bool_]:
+    """Whether points (n, 3) are between the outermost of others (m, 3) along all axes (k, 3)."""
+    along = box @ axes.T
+    slack = THIN * np.ptp(along, axis=0).max()
+    here = points @ axes.T
+    return ((here >= along.min(axis=0) - slack) & (here <= along.max(axis=0) + slack)).all(axis=1)
 
 
 def _crossings(
@@ -177,7 +208,8 @@ def _planes(inside: Inside) -> tuple[list[_Plane], Floats]:
     """Planes that openings may lie in, and the directions that walls look to, (k, 3)."""
     points, normals = inside.points, inside.normals
     thin = THIN * float(np.ptp(points, axis=0).max())
-    planes, axes = [], [np.array([0.0, 0.0, 1.0])]
+    planes: list[_Plane] = []
+    axes: list[Floats] = []
     rest = np.ones(len(points), bool)
     while rest.any():
         first = int(np.argmax(rest))
@@ -189,10 +221,12 @@ def _planes(inside: Inside) -> tuple[list[_Plane], Floats]:
         rest &= ~alike
         if count < FEWEST_EACH:
             continue
-        planes.append(_Plane(normal, float(offset)))
+        planes.append(_Plane(normal, float(offset), count))
         is_new = all(abs(normal @ axis) < FLAT for axis in axes)
         if is_new and count >= LARGE * len(points):
             axes.append(normal)
+    axes = axes or [np.array([0.0, 0.0, 1.0])]
+    planes = sorted(planes, key=lambda one: -one.surfaces)[:MOST_PLANES]
     for axis in axes:
         along = points @ axis
         planes += [_Plane(axis, float(along.min())), _Plane(-axis, float(-along.max()))]
@@ -202,22 +236,25 @@ def _planes(inside: Inside) -> tuple[list[_Plane], Floats]:
 def _rectangles(plane: _Plane, axes: Floats, points: Floats, fewest: float) -> list[Opening]:
     """Around points in a plane, (n, 3): as many as there are groups of so many of them."""
     from scipy.cluster.hierarchy import fcluster, linkage
+    from scipy.spatial import KDTree
 
-    frames = list(_frames(plane.inwards, axes))
-    whole = min(
-        (_around(plane.inwards, frame, points) for frame in frames),
-        key=lambda one: one.width * one.height,
-    )
-    near = APART * np.sqrt(whole.width * whole.height / len(points))
+    nearest = KDTree(points).query(points, 2)[0][:, 1]
+    near = APART * np.quantile(nearest, 0.25)  # where they are dense: of the narrowest
     if near == 0:
         return []
     group = fcluster(linkage(points, "single"), near, "distance")
     counts = np.bincount(group)
     return [
-        _around(plane.inwards, (whole.across, whole.up), points[group == k])
+        _smallest(plane.inwards, axes, points[group == k])
         for k in np.argsort(-counts, kind="stable")
         if counts[k] >= fewest
     ]
+
+
+def _smallest(inwards: Floats, axes: Floats, points: Floats) -> Opening:
+    """The smallest rectangle around points in a plane, (n, 3), with sides as walls have them."""
+    around = [_around(inwards, frame, points) for frame in _frames(inwards, axes)]
+    return min(around, key=lambda one: one.width * one.height)
 
 
 def _frames(inwards: Floats, axes: Floats) -> list[tuple[Floats, Floats]]:
@@ -237,17 +274,18 @@ def _frames(inwards: Floats, axes: Floats) -> list[tuple[Floats, Floats]]:
 
 
 def _around(inwards: Floats, frame: tuple[Floats, Floats], points: Floats) -> Opening:
-    """The rectangle around points (n, 3), by so much larger as n of them do not reach its edges."""
+    """The rectangle around points (n, 3), twice as much larger as n of them do not reach its edges:
+    what is missed of an opening is noisier than a rim of a wall is."""
     across, up = frame
     middle = points.mean(axis=0)
     local = (points - middle) @ np.stack(frame, axis=1)
     low, high = local.min(axis=0), local.max(axis=0)
-    width, height = (high - low) * (1 + 2 / (len(points) + 1))
+    width, height = (high - low) * (1 + 4 / (len(points) + 1))
     x, y = (low + high) / 2
     return Opening(middle + x * across + y * up, across, up, inwards, float(width), float(height))
 
 
-def _with_edges(inside: Inside, rough: Opening) -> Opening:
+def _with_edges(inside: Inside, axes: Floats, rough: Opening) -> Opening:
     """An opening whose edges were looked for, in ever larger rectangles until they are found."""
     random = np.random.default_rng(0)
     for _ in range(GROWTHS):
@@ -255,7 +293,7 @@ def _with_edges(inside: Inside, rough: Opening) -> Opening:
         if len(targets) < FEWEST_EACH:
             return rough
         size = rough.width, rough.height
-        rough = _around(rough.inwards, (rough.across, rough.up), targets)
+        rough = _smallest(rough.inwards, axes, targets)
         if rough.width < GROWN * size[0] and rough.height < GROWN * size[1]:
             break
     return rough

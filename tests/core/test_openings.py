@@ -1,0 +1,210 @@
+"""Openings of boxes with holes in their walls, whose rays are known in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from sunsplit.core.openings import Inside, find_openings
+from sunsplit.core.portal_noise import LightInside, mean_squares, openings_pay
+
+SIZE = np.array([4.0, 6.0, 3.0])
+LOOKS = 3
+
+
+@dataclass(frozen=True)
+class Hole:
+    """In the wall across an axis, at its lower or upper end: a rectangle in the two other axes."""
+
+    axis: int
+    upper: bool
+    low: tuple[float, float]
+    high: tuple[float, float]
+
+    @property
+    def corners(self) -> np.ndarray:
+        """(2, 3): opposite ones."""
+        others = [k for k in range(3) if k != self.axis]
+        corners = np.full((2, 3), SIZE[self.axis] if self.upper else 0.0)
+        corners[0, others], corners[1, others] = self.low, self.high
+        return corners
+
+
+def meet(holes, starts, directions):
+    """Where rays from inside leave the box, (n, 3), the inward normals there, and whether that is
+    through a hole."""
+    with np.errstate(divide="ignore"):
+        ends = np.where(directions > 0, (SIZE - starts) / directions, -starts / directions)
+    axis = np.argmin(ends, axis=1)
+    rows = np.arange(len(starts))
+    points = starts + ends[rows, axis, None] * directions
+    upper = directions[rows, axis] > 0
+    normals = np.zeros_like(points)
+    normals[rows, axis] = np.where(upper, -1, 1)
+    out = np.zeros(len(starts), bool)
+    for hole in holes:
+        low, high = hole.corners
+        within = ((points >= low - 1e-9) & (points <= high + 1e-9)).all(axis=1)
+        out |= within & (axis == hole.axis) & (upper == hole.upper)
+    return points, normals, out
+
+
+def look_around(holes, turn=None, count=1500, seed=0):
+    """Looks from everywhere on the walls of a box with holes, in turned axes."""
+    random = np.random.default_rng(seed)
+    turn = Rotation.identity() if turn is None else turn
+    towards = random.normal(size=(4 * count, 3))
+    places, normals, out = meet(holes, np.tile(SIZE / 2, (4 * count, 1)), towards)
+    places, normals = places[~out][:count], normals[~out][:count]
+    directions = random.normal(size=(count, LOOKS, 3))
+    directions *= np.sign(np.einsum("pld,pd->pl", directions, normals))[..., None]
+    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+    starts = np.repeat(places + 1e-6 * normals, LOOKS, axis=0)
+    directions = directions.reshape(-1, 3)
+    points, facing, out = meet(holes, starts, directions)
+
+    def is_open(start, direction):
+        ray = turn.inv().apply([start, direction])
+        return bool(meet(holes, ray[:1], ray[1:])[2][0])
+
+    return Inside(
+        turn.apply(places + 1e-6 * normals),
+        LOOKS,
+        turn.apply(directions[out]),
+        np.flatnonzero(out) // LOOKS,
+        turn.apply(points[~out]),
+        turn.apply(facing[~out]),
+        is_open,
+    )
+
+
+def covers(opening, hole, turn=None):
+    """How much of a hole an opening covers, and the area of both in that of the hole."""
+    turn = Rotation.identity() if turn is None else turn
+    low, high = hole.corners
+    where = np.random.default_rng(1).random((2000, 3))
+    points = turn.apply(low + where * (high - low)) - opening.centre
+    assert np.abs(points @ opening.inwards).max() < 0.01
+    within = np.abs(points @ opening.across) <= opening.width / 2
+    within &= np.abs(points @ opening.up) <= opening.height / 2
+    return within.mean(), opening.width * opening.height / np.prod(np.delete(high - low, hole.axis))
+
+
+WINDOW = Hole(0, True, (2.0, 1.0), (3.5, 2.2))
+
+
+def test_a_window_is_found_with_its_edges():
+    (found,) = find_openings(look_around([WINDOW]))
+    covered, size = covers(found, WINDOW)
+    assert covered > 0.95
+    assert size < 1.05
+    np.testing.assert_allclose(found.inwards, [-1, 0, 0], atol=1e-6)
+    frame = np.stack([found.across, found.up, found.inwards])
+    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-6)
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    axis=st.sampled_from([0, 1, 2]),
+    upper=st.booleans(),
+    left=st.floats(0.05, 0.5),
+    width=st.floats(0.2, 0.45),
+    bottom=st.floats(0.05, 0.5),
+    height=st.floats(0.2, 0.45),
+    seed=st.integers(0, 99),
+)
+def test_any_window_of_any_turned_room_is_found(axis, upper, left, width, bottom, height, seed):
+    sides = np.delete(SIZE, axis)
+    low = sides * (left, bottom)
+    hole = Hole(axis, upper, tuple(low), tuple(low + sides * (width, height)))
+    turn = Rotation.random(random_state=seed)
+    (found,) = find_openings(look_around([hole], turn, count=3000, seed=seed))
+    covered, size = covers(found, hole, turn)
+    assert covered > 0.9
+    assert size < 1.15
+
+
+def test_two_windows_in_one_wall_and_a_skylight_are_three():
+    second = Hole(0, True, (0.4, 1.0), (1.4, 2.2))
+    skylight = Hole(2, True, (1.0, 4.0), (2.0, 5.0))
+    holes = [WINDOW, second, skylight]
+    found = find_openings(look_around(holes, count=4000))
+    assert len(found) == 3
+    for hole in holes:
+        middle = hole.corners.mean(axis=0)
+        nearest = min(found, key=lambda one, to=middle: np.linalg.norm(one.centre - to))
+        covered, size = covers(nearest, hole)
+        assert covered > 0.9
+        assert size < 1.15
+
+
+def test_a_missing_wall_is_an_opening():
+    small_side = Hole(1, False, (0.0, 0.0), (SIZE[0], SIZE[2]))
+    (found,) = find_openings(look_around([small_side]))
+    covered, size = covers(found, small_side)
+    assert covered > 0.9
+    assert size < 1.1
+
+
+def test_an_open_scene_has_none():
+    roof = Hole(2, True, (0.0, 0.0), (SIZE[0], SIZE[1]))
+    assert find_openings(look_around([roof])) == ()
+
+
+def test_a_closed_scene_and_one_with_a_crack_have_none():
+    assert find_openings(look_around([])) == ()
+    assert find_openings(look_around([Hole(0, True, (2.0, 1.0), (2.001, 2.0))])) == ()
+
+
+def test_a_garden_before_the_window_does_not_count():
+    """What is outside is lit by all of the sky and explained by no opening."""
+    inside = look_around([WINDOW], count=2000)
+    random = np.random.default_rng(5)
+    garden = np.column_stack(
+        [random.uniform(4.5, 30, 500), random.uniform(-9, 9, 500), [0.0] * 500]
+    )
+    up = random.normal(size=(1500, 3))
+    up[:, 2] = np.abs(up[:, 2])
+    up /= np.linalg.norm(up, axis=1)[:, None]
+    more = Inside(
+        np.concatenate([inside.places, garden]),
+        LOOKS,
+        np.concatenate([inside.escaped, up]),
+        np.concatenate([inside.started, 2000 + np.arange(1500) // LOOKS]),
+        inside.points,
+        inside.normals,
+        inside.is_open,
+    )
+    (found,) = find_openings(more)
+    covered, size = covers(found, WINDOW)
+    assert covered > 0.9
+    assert size < 1.1
+
+
+def light(sky, suns, lit=0.02, out=0.02):
+    """Places of which a part sees a sun of so much irradiance, and a part of the looks the sky."""
+    looks, places = 3000, 1000
+    facing = np.full((places, 1), suns)
+    given = np.where(np.arange(places) < lit * places, suns, 0.0)[:, None]
+    escaped = np.full(int(out * looks), sky)
+    return LightInside(escaped, np.full(len(escaped), 0.5), looks, facing, given, sky)
+
+
+def test_openings_pay_where_the_sky_gives_the_light():
+    assert openings_pay(light(sky=1.0, suns=0.0), has_table=False)
+    assert openings_pay(light(sky=1.0, suns=1.0), has_table=False)
+
+
+def test_openings_do_not_pay_where_the_suns_give_it_or_rays_find_the_sky():
+    assert not openings_pay(light(sky=0.05, suns=10.0), has_table=False)
+    assert not openings_pay(light(sky=1.0, suns=0.0, out=0.9), has_table=False)
+
+
+def test_of_the_sky_alone_rays_find_its_square_by_how_rarely_they_get_out():
+    rare, often = (mean_squares(light(1.0, 0.0, out=out), False) for out in (0.01, 0.1))
+    assert rare[0] / rare[1] == pytest.approx(10 * often[0] / often[1])
