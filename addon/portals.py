@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -12,8 +13,8 @@ from numpy.typing import NDArray
 from ..core import sphere
 from ..core.conversion import Conversion
 from ..core.environment import LUMINANCE_WEIGHTS, luminance
-from ..core.openings import WIDEST, Inside, Opening, find_openings
-from ..core.portal_noise import LightInside, openings_pay
+from ..core.openings import WIDEST, Inside, Opening, find_openings, part_seen
+from ..core.portal_noise import LightInside
 from ..core.sums import weighted_sum
 from .rays import LOOKS, Reach
 from .steps import Steps
@@ -34,17 +35,26 @@ SUNLIT = 600
 """Places that are asked for suns."""
 
 
-def find_portals(
-    reach: Reach,
-    conversion: Conversion,
-    to_map: NDArray[np.float64],
-    has_table: bool,
-) -> Steps[tuple[Opening, ...]]:
-    """The openings of the scene; none where it has none that explain all light in it, or where
-    Cycles finds the light as soon without.
+@dataclass(frozen=True, eq=False)
+class ClosedScene:
+    """A scene that light comes into through openings. part: of the half sphere above a place inside
+    that these take."""
 
-    to_map: rotation (3, 3) from the scene's axes to the map's. has_table: see `openings_pay`.
-    """
+    reach: Reach
+    inside: Inside
+    openings: tuple[Opening, ...]
+
+    @property
+    def part(self) -> float:
+        return part_seen(self.inside, self.openings)
+
+    def light(self, conversion: Conversion, to_map: NDArray[np.float64]) -> Steps[LightInside]:
+        """Of a conversion with a residual. to_map: rotation (3, 3) from the scene's axes."""
+        return _light_inside(self.reach, self.inside, conversion, to_map)
+
+
+def closed_scene(reach: Reach) -> Steps[ClosedScene | None]:
+    """The scene with its openings; None where it has none that explain all light in it."""
     for _ in range(MOST_PATHS):
         if len(reach.escaped) >= min(ENOUGH, WIDEST * LOOKS * max(len(reach.places), 1)):
             break
@@ -52,10 +62,7 @@ def find_portals(
         yield
     inside = _inside(reach)
     openings = find_openings(inside)
-    if not openings:
-        return ()
-    light = yield from _light_inside(reach, inside, conversion, to_map)
-    return openings if openings_pay(light, has_table) else ()
+    return ClosedScene(reach, inside, openings) if openings else None
 
 
 def _inside(reach: Reach) -> Inside:

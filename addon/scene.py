@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,10 +14,11 @@ from ..core.errors import UnusableInput
 from ..core.openings import Opening
 from ..core.outlines import outlines_of
 from ..core.passes import parts_of, samples_of_passes
+from ..core.portal_noise import openings_pay
 from ..core.progress import Progress, silent
 from ..core.sampling import BY_PORTALS, WorldSampling, choose_sampling, needs_light_tree
 from ..core.settings import ConversionSettings
-from ..core.visible import VisiblePart, visible_part
+from ..core.visible import VisiblePart, through_openings, visible_part
 from . import eevee, passes
 from .controls import keep_factors
 from .driven import followed
@@ -34,7 +35,7 @@ from .known import known_conversion
 from .lamps import collection_of, make_lamps, name_lamps
 from .light_groups import put_into_groups
 from .options import SceneOptions
-from .portals import find_portals, has_portals, make_portals
+from .portals import ClosedScene, closed_scene, has_portals, make_portals
 from .rays import Reach
 from .report import headline, made_sentences, portal_sentences, skipped_sentences
 from .restoring import restore_scene, swap_overrides
@@ -106,10 +107,14 @@ def conversion_steps(
     needed = _without_excess(settings, environment.own_width, needs)
     reach = yield from _reach(scene, needs)
     visible = yield from _what_is_visible(reach, environment, needed, light)
-    conversion = yield Apart(
-        lambda listen, _: known_conversion(environment, needed, visible, listen), READ, MADE
+    conversion, openings = yield from _converted(
+        lambda part: Apart(
+            lambda listen, _: known_conversion(environment, needed, part, listen), READ, MADE
+        ),
+        visible,
+        (yield from _closed(scene, reach, needed)),
+        light,
     )
-    openings = yield from _openings(scene, reach, conversion, light)
     with folder_for_maps() as folder:
         paths = yield Apart(lambda *_: _write_maps(folder, conversion, needs), MADE, 1)
         outlines = yield Apart(lambda *_: outlines_of(conversion).to_text(), 1, 1)
@@ -163,14 +168,33 @@ def _what_is_visible(
     )
 
 
-def _openings(
-    scene: bpy.types.Scene, reach: Reach | None, conversion: Conversion, light: WorldLight
-) -> Steps[tuple[Opening, ...]]:
-    """Where portals help Cycles; none where the user has made some."""
-    if reach is None or conversion.residual is None or has_portals(scene):
-        return ()
-    has_table = _sampling(conversion).method != "NONE"
-    return (yield from find_portals(reach, conversion, light.map_from_world, has_table))
+def _closed(
+    scene: bpy.types.Scene, reach: Reach | None, settings: ConversionSettings
+) -> Steps[ClosedScene | None]:
+    """The scene's openings where portals may help; None where the user has made some."""
+    if reach is None or not settings.leaves_residual or has_portals(scene):
+        return None
+    return (yield from closed_scene(reach))
+
+
+def _converted(
+    convert: Callable[[VisiblePart | None], Apart],
+    visible: VisiblePart | None,
+    closed: ClosedScene | None,
+    light: WorldLight,
+) -> Steps[tuple[Conversion, tuple[Opening, ...]]]:
+    """A conversion, and the openings that it is made for: that for Cycles with portals in them or
+    without, which ever is predicted to be less noisy."""
+    if closed is None:
+        return (yield convert(visible)), ()
+    to_map = light.map_from_world
+    told = yield convert(through_openings(visible, closed.part))
+    light_told = yield from closed.light(told, to_map)
+    untold = yield convert(visible)
+    light_untold = yield from closed.light(untold, to_map)
+    if openings_pay(light_told, light_untold, _sampling(untold).method != "NONE"):
+        return told, closed.openings
+    return untold, ()
 
 
 def _sampling(conversion: Conversion) -> WorldSampling:

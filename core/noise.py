@@ -7,6 +7,11 @@ one sample of each has, in squares of the mean irradiance, the mean variance
     suns:      16 (F_A^2 / 6 - K_A) / F^2              F: light, the integral of L
     residual:  16 (pi/4 * integral of R^2 - K_B) / F^2   K: mean square of the irradiance
 
+In a closed scene whose openings the path tracer knows it looks for the residual through these. If
+they take a part f of the half sphere above a place, of which 2 pi f is the solid angle, that leaves
+pi f / 3 instead of pi/4; what is seen of suns and of the residual is as rare, so that the mean
+squares K do not count.
+
 Renders are less noisy than that, but least noisy for about the same border
 (docs/benchmarks/region_a.md).
 """
@@ -92,11 +97,13 @@ class Borders:
     """Borders that a map could be cut at, the highest first, which leaves no suns; all (n,).
 
     level: luminance. suns: variance of what lies above it. residual: of the map cut off there.
+    without: so much more variance is taken for no suns at all.
     """
 
     level: Floats
     suns: Floats
     residual: Floats
+    without: float = WITHOUT
 
     @property
     def variance(self) -> Floats:
@@ -106,7 +113,7 @@ class Borders:
     def best(self) -> int:
         """The highest that is about as calm as the calmest, or 0: no suns."""
         variance = self.variance
-        if variance[0] <= WITHOUT * variance.min():
+        if variance[0] <= self.without * variance.min():
             return 0
         return int(np.argmax(variance <= WORTH * variance.min()))
 
@@ -115,10 +122,11 @@ class Borders:
         return float(self.level[self.best])
 
 
-def borders(lum: Floats, solid: Floats) -> Borders:
+def borders(lum: Floats, solid: Floats, through: float | None = None) -> Borders:
     """What each border would leave of noise.
 
-    lum: luminance (height, width), not all 0. solid: of a pixel of each row, (height,).
+    lum: luminance (height, width), not all 0. solid: of a pixel of each row, (height,). through:
+    the part f of a half sphere that openings take, where they are known.
     """
     height, width = lum.shape
     weight, flat = np.repeat(solid, width), lum.ravel()
@@ -136,8 +144,11 @@ def borders(lum: Floats, solid: Floats) -> Borders:
     of_squares = np.stack([weight_of, weight_of * value**2], axis=-1)
     squares = _sums_to(of_squares, first, len(level))
     above = squares[:, 1] - level**2 * squares[:, 0]
-    rest = _all_harmonics(lum * solid[:, None]) - suns
     unit = 16 / light**2
+    if through is not None:  # light is looked for anyway: suns cost no more time
+        residual = np.pi / 3 * through * (square - above)
+        return Borders(level, unit * square_from_one_place(suns), unit * residual, WORTH)
+    rest = _all_harmonics(lum * solid[:, None]) - suns
     return Borders(
         level,
         unit * (square_from_one_place(suns) - mean_square_irradiance(suns)),

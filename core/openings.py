@@ -11,7 +11,7 @@ missing. An opening that is found too small or too large costs noise and changes
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -151,18 +151,32 @@ def find_openings(inside: Inside) -> tuple[Opening, ...]:
     return tuple(found) if found and _is_closed(inside, found) else ()
 
 
+def part_seen(inside: Inside, found: Sequence[Opening]) -> float:
+    """Of the half sphere above a place inside, what openings take on average."""
+    through, within = _from_inside(inside, found)
+    return float(through.sum() / (inside.looks * within.sum()))
+
+
 def _is_closed(inside: Inside, found: list[Opening]) -> bool:
     """Whether openings are all there is, for those places that are inside of them."""
-    starts = inside.places[inside.started]
-    through = np.any([each.is_crossed(starts, inside.escaped) for each in found], axis=0)
-    within = np.all([each.is_before(inside.places) for each in found], axis=0)
-    within[inside.started[through]] = True
+    through, within = _from_inside(inside, found)
     out = within[inside.started].sum()
     return bool(
         through.sum() >= COVERED * out
         and out <= WIDEST * inside.looks * within.sum()
         and within.mean() >= INSIDE
     )
+
+
+def _from_inside(
+    inside: Inside, found: Sequence[Opening]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which rays get out through openings, (n,), and which places are inside of them, (p,)."""
+    starts = inside.places[inside.started]
+    through = np.any([each.is_crossed(starts, inside.escaped) for each in found], axis=0)
+    within = np.all([each.is_before(inside.places) for each in found], axis=0)
+    within[inside.started[through]] = True
+    return through, within
 
 
 def _through_one_plane(

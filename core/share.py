@@ -61,7 +61,8 @@ class Seen(Memo):
     @cached_property
     def borders(self) -> Borders:
         """That the map could be cut at."""
-        return borders(self.luminance, sphere.row_solid_angles(*self.luminance.shape[::-1]))
+        solid = sphere.row_solid_angles(*self.luminance.shape[::-1])
+        return borders(self.luminance, solid, self.visible.through if self.visible else None)
 
     def strata(self, level: float, count: int) -> Strata:
         return self.once((level, count), lambda: stratify_at(self.luminance, level, count))

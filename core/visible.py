@@ -43,14 +43,17 @@ _SIZE = 2 * ROWS, ROWS
 
 @dataclass(frozen=True, eq=False)
 class VisiblePart:
-    """cells: whether light from there may reach something, bool (ROWS, 2 ROWS), rows downwards."""
+    """cells: whether light from there may reach something, bool (ROWS, 2 ROWS), rows downwards.
+    through: where it is looked for through openings, the part of the half sphere above a place
+    that these take."""
 
     cells: NDArray[np.bool_]
+    through: float | None = None
 
     @cached_property
-    def key(self) -> bytes:
+    def key(self) -> tuple[bytes, float | None]:
         """The same for the same part."""
-        return self.cells.tobytes()
+        return self.cells.tobytes(), self.through
 
     def pixels(self, width: int, height: int) -> NDArray[np.bool_]:
         """Which pixels of a map of this size are visible, (height, width)."""
@@ -74,6 +77,12 @@ class Looks:
     count: int
     places: int
     reaches: Callable[[NDArray[np.float64], int], bool]
+
+
+def through_openings(visible: VisiblePart | None, part: float) -> VisiblePart:
+    """The same, or all of a map, through openings."""
+    cells = visible.cells if visible else np.ones((ROWS, 2 * ROWS), bool)
+    return VisiblePart(cells, part)
 
 
 def visible_part(environment: EnvironmentMap, looks: Looks) -> VisiblePart | None:

@@ -35,6 +35,10 @@ PLAIN, SPLIT = "plain HDRI", "Sunsplit"
 BY_HAND = ("NONE", "256", "512", "1024", "2048", "4096")
 TARGETS = (0.05, 0.02)
 
+BRIGHTEST = {"glossy": 10.0}
+"""Scenes whose pictures count up to so many of their medians, as a display would: in them a mirrored
+sun, a fiftieth of a pixel wide, is met by one sample in thousands and outshines all else."""
+
 TILES = 8
 """Along a picture's side, whose means are taken as independent of each other."""
 
@@ -79,13 +83,15 @@ def curves_of(path: Path, scene: str, options: argparse.Namespace) -> list[Curve
         _open(folder, PLAIN)
         for seed in (1001, 1002):
             halves.append(timed_render(bpy.context.scene, folder, options.reference, seed)[0])
+        brightest = BRIGHTEST.get(scene, np.inf) * float(np.median(halves))
+        halves = [np.minimum(half, brightest) for half in halves]
         shots: dict[str, list[tuple[int, np.ndarray, float]]] = {way: [] for way in ways}
         for repeat in range(options.repeats):
             for samples in options.samples:
                 for way in ways:
                     _open(folder, way)
-                    found = timed_render(bpy.context.scene, folder, samples, repeat)
-                    shots[way].append((samples, *found))
+                    image, seconds = timed_render(bpy.context.scene, folder, samples, repeat)
+                    shots[way].append((samples, np.minimum(image, brightest), seconds))
         memory = {way: _peak(folder / f"{way}.blend") for way in ways}
     return [
         _curve((path.stem, scene, way, ways[way]), shots[way], halves, memory[way]) for way in ways
@@ -110,11 +116,13 @@ def _peak(file: Path) -> float:
 
 
 def enlarged(path: Path, width: int, folder: Path) -> Path:
-    """The map, or one so wide, linear between its pixels, in the folder."""
-    if width <= load(path).own_width:
+    """The map, or one so wide, linear between its pixels, in the folder; of a map with pixels that
+    are no light one that is repaired, as each way would take another picture from it."""
+    known = load(path)
+    if width <= known.own_width and not known.repairs.pixels:
         return path
     file = folder / f"{path.stem}.exr"
-    make(path, width, Kind("exr", "float", "zip"), file, grain=0)
+    make(path, max(width, known.own_width), Kind("exr", "float", "zip"), file, grain=0)
     return file
 
 

@@ -26,6 +26,7 @@ from tests.benchmarks import (
     looking,
     methods,
     one_light,
+    portals,
     region_a,
     shares,
     table1,
@@ -114,6 +115,14 @@ def test_light_tree(tmp_path, sunrise):
     assert [one.lamps for one in results] == sorted(one.lamps for one in results)
     assert all(min(*one.noise, *one.seconds) > 0 for one in results)
     assert "| product |" in (tmp_path / "light_tree.md").read_text()
+
+
+def test_portals(tmp_path, sunrise):
+    few = ["--size", "12", "--samples", "16", "--repeats", "2", "-o", str(tmp_path)]
+    (result,) = portals.main([str(sunrise), *few])
+    assert min(*result.variance, *result.seconds, result.predicted) > 0
+    lines = (tmp_path / "portals.md").read_text().splitlines()
+    assert sum(line.startswith("| ") for line in lines) == 3
 
 
 def test_two_passes(tmp_path, sunrise):

@@ -1,0 +1,149 @@
+"""Do portals pay in a room? Cost to equal noise of conversions with them and without.
+
+    .venv-5.2/bin/python -m tests.benchmarks.portals MAP ... [-o FOLDER]
+
+For each map the room with a window: the plain HDRI as Blender sets it up, the conversion that is
+made for portals, with them, and the one for a path tracer that knows of none; "predicted" is the
+mean square of what a sample finds without portals, that with them being 1.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from unittest import mock
+
+import bpy
+import numpy as np
+
+from sunsplit.addon import scene as conversions
+from sunsplit.core.portal_noise import (
+    LightInside,
+    mean_square_told,
+    mean_square_untold,
+    openings_pay,
+)
+from sunsplit.core.settings import ConversionSettings
+from tests.benchmarks.scenes import room
+from tests.blender import timed_render
+
+PLAIN, WITHOUT, WITH = "plain", "without", "with"
+WAYS = (PLAIN, WITHOUT, WITH)
+
+
+@dataclass(frozen=True)
+class Result:
+    """variance: of a sample, in squares of the mean, and seconds of a picture, each way's. lamps:
+    without portals and with them. predicted: see above. chosen: what the program makes."""
+
+    map: str
+    lamps: tuple[int, int]
+    variance: tuple[float, float, float]
+    seconds: tuple[float, float, float]
+    predicted: float
+    chosen: str
+
+    def cost(self, way: str) -> float:
+        k = WAYS.index(way)
+        return self.variance[k] * self.seconds[k]
+
+
+def measure(path: Path, options: argparse.Namespace) -> Result:
+    """All ways for one map, interleaved."""
+    seen: list[tuple[LightInside, LightInside, bool]] = []
+    with tempfile.TemporaryDirectory() as name:
+        folder, lamps = Path(name), []
+        for way in WAYS:
+            made = room(path.resolve(), options.size)
+            if way != PLAIN:
+                lamps.append(_convert(made, way == WITH, seen))
+            _save(folder, way)
+        shots: dict[str, list[tuple[np.ndarray, float]]] = {way: [] for way in WAYS}
+        for seed in range(options.repeats):
+            for way in WAYS:
+                bpy.ops.wm.open_mainfile(filepath=str(folder / f"{way}.blend"))
+                shots[way].append(timed_render(bpy.context.scene, folder, options.samples, seed))
+    mean = np.mean([image for way in WAYS for image, _ in shots[way]])
+    told, untold, has_table = seen[-1] if seen else (None, None, False)
+    return Result(
+        path.stem,
+        (lamps[0], lamps[1]),
+        *zip(*(_noise_and_time(shots[way], mean, options.samples) for way in WAYS), strict=True),
+        mean_square_untold(untold, has_table) / mean_square_told(told) if seen else np.nan,
+        WITH if seen and openings_pay(told, untold, has_table) else WITHOUT,
+    )
+
+
+def _convert(made: bpy.types.Scene, portals: bool, seen: list) -> int:
+    """Convert a scene with portals or without, whatever the program would choose; its lamps."""
+
+    def choose(*asked: object) -> bool:
+        seen.append(asked)
+        return portals
+
+    with mock.patch.object(conversions, "openings_pay", choose):
+        return len(conversions.convert_scene(made, ConversionSettings()).conversion.suns)
+
+
+def _save(folder: Path, way: str) -> None:
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{way}.blend"), copy=True)
+
+
+def _noise_and_time(
+    shots: Sequence[tuple[np.ndarray, float]], mean: float, samples: int
+) -> tuple[float, float]:
+    variance = np.var([image for image, _ in shots], axis=0, ddof=1).mean()
+    return float(samples * variance / mean**2), float(np.median([took for _, took in shots]))
+
+
+def table(results: Sequence[Result]) -> str:
+    lines = [
+        "# Portals",
+        "",
+        f"Blender {bpy.app.version_string}, a room with a window. Variance of a sample in squares "
+        "of the mean / seconds of a picture: the plain HDRI, a conversion without portals, one "
+        "with them; cost to equal noise without, that with them being 1, as predicted (but for the "
+        "time of a sample) and as measured; how many times less the chosen one costs than the "
+        "plain HDRI.",
+        "",
+        "| map | lamps without / with | plain | without | with | predicted | measured | chosen "
+        "| against plain |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for r in results:
+        ways = " | ".join(
+            f"{variance:.3g} / {took:.2f}"
+            for variance, took in zip(r.variance, r.seconds, strict=True)
+        )
+        lines.append(
+            f"| {r.map} | {r.lamps[0]} / {r.lamps[1]} | {ways} | {r.predicted:.2f} "
+            f"| {r.cost(WITHOUT) / r.cost(WITH):.2f} | {r.chosen} "
+            f"| {r.cost(PLAIN) / r.cost(r.chosen):.2f} |"
+        )
+    gains = [np.log(r.cost(PLAIN) / r.cost(r.chosen)) for r in results]
+    lines += ["", f"Geometric mean against plain: {np.exp(np.mean(gains)):.2f}"]
+    return "\n".join(lines) + "\n"
+
+
+def main(arguments: Sequence[str] | None = None) -> list[Result]:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("maps", nargs="+", type=Path, metavar="MAP")
+    parser.add_argument("-o", "--output", type=Path, default=Path("out"))
+    parser.add_argument("--size", type=int, default=48)
+    parser.add_argument("--samples", type=int, default=128)
+    parser.add_argument("--repeats", type=int, default=4)
+    options = parser.parse_args(arguments)
+    options.output.mkdir(parents=True, exist_ok=True)
+    results = []
+    for path in options.maps:
+        results.append(measure(path, options))
+        (options.output / "portals.md").write_text(table(results), encoding="utf-8")
+        print(path.stem, flush=True)
+    return results
+
+
+if __name__ == "__main__":
+    main()
