@@ -14,7 +14,7 @@ from ..core.errors import UnusableInput
 from ..core.outlines import outlines_of
 from ..core.passes import parts_of, samples_of_passes
 from ..core.progress import Progress, silent
-from ..core.sampling import choose_sampling, needs_light_tree
+from ..core.sampling import choose_sampling
 from ..core.settings import ConversionSettings
 from ..core.visible import VisiblePart, visible_part
 from . import eevee, passes
@@ -32,6 +32,7 @@ from .images import (
 from .known import known_conversion
 from .lamps import collection_of, make_lamps, name_lamps
 from .light_groups import put_into_groups
+from .light_tree import make_guards, tree_plan
 from .options import SceneOptions
 from .rays import Reach
 from .report import headline, made_sentences, skipped_sentences
@@ -172,7 +173,7 @@ def _replace(
     state, world = scene.sunsplit, scene.world
     needs = found if options.skips else ALL
     original = state.original_world if _is_converted(scene) else world
-    tree_off = _is_without_light_tree(scene, conversion, needs)
+    tree = tree_plan(scene, conversion, needs, found)
     has_cells = conversion.settings.residual == "voronoi"
     sampling = choose_sampling(
         conversion.residual, conversion.visible_share, has_cells, conversion.visible
@@ -186,9 +187,11 @@ def _replace(
     rig = make_rig(light.texture)
     keep_factors(state.sky, rig.sky)
     lamps = make_lamps(conversion.suns, light, rig, new)
+    guards = make_guards(rig, lamps) if tree.guarded else []
     sentences = [
         *made_sentences(conversion),
-        *skipped_sentences(conversion, settings, needs, tree_off),
+        *skipped_sentences(conversion, settings, needs, tree.is_idle),
+        *tree.warnings,
         *_warnings(scene, (world, original), light, [*rig_of(rig.sky), *lamps]),
     ]
     for_eevee = settings.in_eevee or "EEVEE" in scene.render.engine
@@ -196,8 +199,8 @@ def _replace(
         sentences += eevee.losses(conversion.residual, light.gain)
     restore_scene(scene)
     name_images(new, conversion.environment.name)
-    result = _install(scene, original, conversion, new, rig, lamps)
-    if tree_off:
+    result = _install(scene, original, conversion, new, rig, lamps, guards)
+    if tree.off:
         scene.cycles.use_light_tree, state.light_tree_off = False, True
     if for_eevee:
         eevee.apply(scene, lamps)
@@ -220,17 +223,6 @@ def _without_excess(
         return settings
     narrower = needs.residual_width(width)
     return replace(settings, residual_width="own" if narrower == width else narrower)
-
-
-def _is_without_light_tree(
-    scene: bpy.types.Scene, conversion: Conversion, needs: SceneNeeds
-) -> bool:
-    """Whether Cycles shall draw lots among the lamps, where there is nothing else to choose."""
-    if not hasattr(scene, "cycles") or needs.other_lights:
-        return False
-    if not scene.cycles.use_light_tree and not scene.sunsplit.light_tree_off:
-        return False  # as the user has it
-    return not needs_light_tree(conversion.suns, conversion.strata.light)
 
 
 def _add_pass(scene: bpy.types.Scene, conversion: Conversion, other_lights: bool) -> list[str]:
@@ -257,6 +249,7 @@ def _install(
     world: bpy.types.World,
     rig: Rig,
     lamps: list[bpy.types.Object],
+    guards: list[bpy.types.Object],
 ) -> SceneConversion:
     """Give a scene its converted world and lamps; the names are free by now."""
     state = scene.sunsplit
@@ -267,7 +260,7 @@ def _install(
     for lamp in lamps:
         state.lamps.add().lamp = lamp
     name_lamps(conversion.suns, lamps, rig, conversion.account.source @ LUMINANCE_WEIGHTS)
-    state.sky, state.collection = rig.sky, collection_of(rig, lamps)
+    state.sky, state.collection = rig.sky, collection_of(rig, [*lamps, *guards])
     scene.collection.children.link(state.collection)
     return SceneConversion(conversion, world, state.collection)
 
