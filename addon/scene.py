@@ -90,7 +90,7 @@ def conversion_steps(
     if options.two_passes:
         passes.check(scene)
     light = find_light(world, scene.render.engine)
-    found = needs_of(scene) if options.skips or options.two_passes else ALL
+    found = needs_of(scene)
     needs = found if options.skips else ALL
     environment = yield from read_image(light.image)
     needed = _without_excess(settings, environment.own_width, needs)
