@@ -54,7 +54,7 @@ def tree_plan(
         return TreePlan()  # as the user has it
     if not needs.other_lights and not needs_light_tree(conversion.suns, conversion.strata.light):
         return TreePlan(is_idle=True)
-    if not overflows(len(conversion.suns) + _other_suns(scene)):
+    if not conversion.suns or not overflows(len(conversion.suns) + _other_suns(scene)):
         return TreePlan()
     if not found.fog:
         return TreePlan(guarded=True)

@@ -166,6 +166,14 @@ def test_few_lamps_need_no_guards(scene):
     assert len(guards_of(scene.sunsplit.sky)) == 4
 
 
+def test_many_lamps_of_the_users_and_none_of_a_conversion(scene):
+    for _ in range(MOST_IN_TREE):
+        add_lamp(scene, "SUN")
+    bpy.ops.sunsplit.convert(share=0.0)
+    assert not scene.sunsplit.lamps
+    assert not guards_of(scene.sunsplit.sky)
+
+
 def test_every_surface_faces_a_guard(scene):
     add_ground(scene)
     convert()
