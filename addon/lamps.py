@@ -13,11 +13,13 @@ from ..core.environment import LUMINANCE_WEIGHTS
 from ..core.suns import Sun
 from .controls import SOFTNESS, STRENGTH, WARMTH
 from .driven import Formula
-from .rig import SKY, Rig, rig_of
+from .rig import SKY, Rig, guards_of, rig_of
 from .trace import TAG, constant
 from .world import WorldLight
 
 COLLECTION = "Sunsplit Suns"
+
+GUARDS = "Sunsplit Light Tree Guard"
 
 
 FARTHEST = 5.0
@@ -43,7 +45,7 @@ def make_lamps(
     """
     lamps = []
     for sun in suns:
-        data = _lamp_data(sun.irradiance * light.gain, sun.angular_diameter)
+        data = lamp_data(sun.irradiance * light.gain, sun.angular_diameter)
         _follow_factors(data, rig.sky, light)
         lamp = bpy.data.objects.new(data.name, data)
         lamp[TAG] = True
@@ -74,13 +76,15 @@ def name_lamps(
     gone. whole: luminance of all light of the map, integrated over the sphere."""
     for empty in rig_of(rig.sky):
         empty.name = SKY
+    for guard in guards_of(rig.sky):
+        guard.name = guard.data.name = GUARDS
     for rank, (sun, lamp) in enumerate(zip(suns, lamps, strict=True), start=1):
         share = float(sun.scalar_irradiance @ LUMINANCE_WEIGHTS) / whole
         percent = f"{share:.0%}" if share >= LEAST_WHOLE else f"{share:.1%}"
         lamp.name = lamp.data.name = f"Sun {rank} ({percent[:-1]} %)"
 
 
-def _lamp_data(irradiance: NDArray[np.float64], diameter: float) -> bpy.types.Light:
+def lamp_data(irradiance: NDArray[np.float64], diameter: float) -> bpy.types.Light:
     """A sun lamp of this normal irradiance, (3,), and angular diameter; nothing left to chance."""
     data = bpy.data.lights.new("Sun", "SUN")
     data[TAG] = True

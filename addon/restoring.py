@@ -8,7 +8,7 @@ from . import eevee, passes
 from .lamps import remove_lamps, unlink_lamps
 from .light_groups import remove_groups
 from .portals import remove_portals
-from .rig import remove_rig, rig_of
+from .rig import guards_of, remove_rig, rig_of
 from .skies import SUNS
 from .world import remove_converted, unconverted
 
@@ -32,7 +32,7 @@ def restore_scene(scene: bpy.types.Scene) -> None:
     passes.remove_suns_layer(scene)
     eevee.take_back(scene)
     remove_groups(scene.view_layers)
-    sky, portals = state.sky, state.portals
+    sky, portals, guards = state.sky, state.portals, guards_of(state.sky)
     _forget(state)
     remove_portals(scene, portals)
     if state.light_tree_off and hasattr(scene, "cycles"):
@@ -43,10 +43,10 @@ def restore_scene(scene: bpy.types.Scene) -> None:
         return
     if converted is not None and not converted.users and SUNS in converted:
         del converted[SUNS]  # else it would keep them
-    made = [*lamps, *rig_of(sky)]
+    made = [*lamps, *guards, *rig_of(sky)]
     unlink_lamps(scene, collection, made)
-    remove_rig(sky, lamps)
-    remove_lamps(lamps)
+    remove_rig(sky, [*lamps, *guards])
+    remove_lamps([*lamps, *guards])
     if converted is not None and converted != original:
         remove_converted(converted)
 

@@ -21,6 +21,9 @@ from .trace import TAG, Input, Place, constant
 
 SKY = "Sunsplit Sky"
 
+GUARD = "sunsplit_guard"
+"""Custom property of a lamp that gives no light (see `light_tree`)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Rig:
@@ -117,6 +120,11 @@ def rig_of(sky: bpy.types.Object | None) -> list[bpy.types.Object]:
         found.append(sky)
         sky = next((c for c in sky.children if c.type == "EMPTY" and c.get(TAG)), None)
     return found
+
+
+def guards_of(sky: bpy.types.Object | None) -> list[bpy.types.Object]:
+    """Lamps of a rig that give no light (see `light_tree`)."""
+    return [c for empty in rig_of(sky) for c in empty.children if c.get(GUARD)]
 
 
 def remove_rig(sky: bpy.types.Object | None, lamps: Sequence[bpy.types.Object]) -> None:

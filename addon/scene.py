@@ -16,7 +16,7 @@ from ..core.outlines import outlines_of
 from ..core.passes import parts_of, samples_of_passes
 from ..core.portal_noise import openings_pay
 from ..core.progress import Progress, silent
-from ..core.sampling import BY_PORTALS, WorldSampling, choose_sampling, needs_light_tree
+from ..core.sampling import BY_PORTALS, WorldSampling, choose_sampling
 from ..core.settings import ConversionSettings
 from ..core.visible import VisiblePart, through_openings, visible_part
 from . import eevee, passes
@@ -34,6 +34,7 @@ from .images import (
 from .known import known_conversion
 from .lamps import collection_of, make_lamps, name_lamps
 from .light_groups import put_into_groups
+from .light_tree import make_guards, tree_plan
 from .options import SceneOptions
 from .portals import ClosedScene, closed_scene, has_portals, make_portals
 from .rays import Reach
@@ -101,7 +102,7 @@ def conversion_steps(
     if options.two_passes:
         passes.check(scene)
     light = find_light(world, scene.render.engine)
-    found = needs_of(scene) if options.skips or options.two_passes else ALL
+    found = needs_of(scene)
     needs = found if options.skips else ALL
     environment = yield from read_image(light.image)
     needed = _without_excess(settings, environment.own_width, needs)
@@ -231,8 +232,7 @@ def _replace(
     needs = found if options.skips else ALL
     original = state.original_world if _is_converted(scene) else world
     conversion, openings = made.conversion, made.openings
-    # With portals the world is a light to choose, too, and not like the lamps.
-    tree_off = not openings and _is_without_light_tree(scene, conversion, needs)
+    tree = tree_plan(scene, conversion, needs, found, bool(openings))
     has_cells = conversion.settings.residual == "voronoi"
     sampling = BY_PORTALS if openings else _sampling(conversion)
     sees_it = needs.camera_sees_world
@@ -244,10 +244,12 @@ def _replace(
     rig = make_rig(light.texture)
     keep_factors(state.sky, rig.sky)
     lamps = make_lamps(conversion.suns, light, rig, new)
+    guards = make_guards(rig, lamps) if tree.guarded else []
     sentences = [
         *made_sentences(conversion),
-        *skipped_sentences(conversion, settings, needs, tree_off),
+        *skipped_sentences(conversion, settings, needs, tree.is_idle),
         *portal_sentences(len(openings)),
+        *tree.warnings,
         *_warnings(scene, (world, original), light, [*rig_of(rig.sky), *lamps]),
     ]
     for_eevee = settings.in_eevee or "EEVEE" in scene.render.engine
@@ -255,9 +257,9 @@ def _replace(
         sentences += eevee.losses(conversion.residual, light.gain)
     restore_scene(scene)
     name_images(new, conversion.environment.name)
-    result = _install(scene, original, conversion, new, rig, lamps)
+    result = _install(scene, original, conversion, new, rig, lamps, guards)
     state.portals = make_portals(scene, openings)
-    if tree_off:
+    if tree.off:
         scene.cycles.use_light_tree, state.light_tree_off = False, True
     if for_eevee:
         eevee.apply(scene, lamps)
@@ -280,17 +282,6 @@ def _without_excess(
         return settings
     narrower = needs.residual_width(width)
     return replace(settings, residual_width="own" if narrower == width else narrower)
-
-
-def _is_without_light_tree(
-    scene: bpy.types.Scene, conversion: Conversion, needs: SceneNeeds
-) -> bool:
-    """Whether Cycles shall draw lots among the lamps, where there is nothing else to choose."""
-    if not hasattr(scene, "cycles") or needs.other_lights:
-        return False
-    if not scene.cycles.use_light_tree and not scene.sunsplit.light_tree_off:
-        return False  # as the user has it
-    return not needs_light_tree(conversion.suns, conversion.strata.light)
 
 
 def _add_pass(scene: bpy.types.Scene, conversion: Conversion, other_lights: bool) -> list[str]:
@@ -317,6 +308,7 @@ def _install(
     world: bpy.types.World,
     rig: Rig,
     lamps: list[bpy.types.Object],
+    guards: list[bpy.types.Object],
 ) -> SceneConversion:
     """Give a scene its converted world and lamps; the names are free by now."""
     state = scene.sunsplit
@@ -327,7 +319,7 @@ def _install(
     for lamp in lamps:
         state.lamps.add().lamp = lamp
     name_lamps(conversion.suns, lamps, rig, conversion.account.source @ LUMINANCE_WEIGHTS)
-    state.sky, state.collection = rig.sky, collection_of(rig, lamps)
+    state.sky, state.collection = rig.sky, collection_of(rig, [*lamps, *guards])
     scene.collection.children.link(state.collection)
     return SceneConversion(conversion, world, state.collection)
 

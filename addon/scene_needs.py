@@ -12,7 +12,7 @@ import bpy
 
 from ..core.environment import whole_part, whole_part_from
 from .rays import Sight, camera_width, is_all_met, stands_still
-from .rig import rig_of
+from .rig import guards_of, rig_of
 
 SHARP = 0.25
 """Roughness below which a surface may show single pixels of a wide map."""
@@ -32,12 +32,14 @@ TRANSLUCENT = {
 class SceneNeeds:
     """camera_sees_world: or a render may show it behind transparent things. mirrors: something
     reflects or refracts sharply. other_lights: something but the world and lamps of conversions
-    gives light. camera_width: pixels around the sphere that a picture can tell apart; None: any.
-    sight: the scene for rays that ask what light reaches; None: they would not tell."""
+    gives light. fog: something may scatter light on its way. camera_width: pixels around the sphere
+    that a picture can tell apart; None: any. sight: the scene for rays that ask what light
+    reaches; None: they would not tell."""
 
     camera_sees_world: bool
     mirrors: bool
     other_lights: bool
+    fog: bool = False
     camera_width: int | None = None
     sight: Sight | None = field(default=None, compare=False)
 
@@ -54,16 +56,13 @@ class SceneNeeds:
         return whole_part_from(width, max(self.camera_width, LIGHTING_WIDTH))
 
 
-ALL = SceneNeeds(camera_sees_world=True, mirrors=True, other_lights=True)
+ALL = SceneNeeds(camera_sees_world=True, mirrors=True, other_lights=True, fog=True)
 """Nothing is skipped."""
 
 
 def needs_of(scene: bpy.types.Scene) -> SceneNeeds:
     """Look at a scene: its camera, lamps, materials and shapes."""
-    state = scene.sunsplit
-    own = {entry.lamp for entry in state.lamps} | set(rig_of(state.sky))
-    own |= set(state.portals.objects) if state.portals else set()
-    shown = list(_shown(thing for thing in scene.objects if thing not in own))
+    shown = shown_things(scene)
     trees = _trees(scene, shown)
     nodes = [node for tree in trees for node in _nodes(tree)]
     if any(tree.animation_data for tree in trees) or any(node.type == "SCRIPT" for node in nodes):
@@ -74,9 +73,25 @@ def needs_of(scene: bpy.types.Scene) -> SceneNeeds:
         mirrors=any(_is_sharp(node) for node in nodes),
         other_lights=any(thing.type == "LIGHT" for thing in shown)
         or any(_shines(node) for node in nodes),
+        fog=_is_foggy(scene, nodes),
         camera_width=camera_width(scene),
         sight=sight if sight and _is_told_by_rays(scene, shown, nodes) else None,
     )
+
+
+def shown_things(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """What renders may show and no conversion has made."""
+    state = scene.sunsplit
+    own = {entry.lamp for entry in state.lamps} | {*rig_of(state.sky), *guards_of(state.sky)}
+    own |= set(state.portals.objects) if state.portals else set()
+    return list(_shown(thing for thing in scene.objects if thing not in own))
+
+
+def _is_foggy(scene: bpy.types.Scene, nodes: Iterable[bpy.types.Node]) -> bool:
+    tree = scene.world and scene.world.node_tree
+    outputs = [*nodes, *(_nodes(tree) if tree else ())]
+    kinds = ("OUTPUT_MATERIAL", "OUTPUT_WORLD")
+    return any(n.type in kinds and n.inputs["Volume"].is_linked for n in outputs)
 
 
 def _sight(scene: bpy.types.Scene, shown: list[bpy.types.Object]) -> Sight | None:

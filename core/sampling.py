@@ -36,6 +36,10 @@ WIDEST_TABLE = 8192
 """The widest that Cycles makes."""
 
 
+MOST_IN_TREE = 32
+"""So many lights at infinity, the world among them, Cycles' light tree can draw from where none of
+them is wholly above a surface; beyond, it leaves out light (see `addon.light_tree`)."""
+
 TIME_BY_TREE, TIME_BY_LOT = 0.05, 0.01
 """More time for each sun, as a part of a picture's, where a path tracer chooses among suns by their
 strength, with a light tree, and where it draws lots; by docs/benchmarks/light_tree.md."""

@@ -15,6 +15,7 @@ from ...core.files.written import WrittenConversion, read_written
 from ...core.sampling import choose_sampling
 from ..images import AS_IT_IS
 from ..lamps import collection_of, make_lamps, name_lamps
+from ..light_tree import make_guards, overflows
 from ..report import headline, predicted
 from ..rig import make_rig
 from ..skies import REPORT, SUNS
@@ -56,7 +57,8 @@ def make_sky(job: AssetJob) -> Sky:
     light = find_light(world)
     rig = make_rig(light.texture)
     lamps = make_lamps(conversion.suns, light, rig, world)
-    collection = collection_of(rig, lamps, f"{job.name} Suns")
+    guards = make_guards(rig, lamps) if overflows(len(lamps)) else []
+    collection = collection_of(rig, [*lamps, *guards], f"{job.name} Suns")
     name_lamps(conversion.suns, lamps, rig, whole)
     world[SUNS], world[REPORT] = collection, _report(conversion)
     return Sky(world, collection, conversion, images)
