@@ -53,7 +53,8 @@ class Cells:
         outside = np.ones(self.width * self.height, bool)
         outside[self.pixels] = False
         outside = outside.reshape(self.height, self.width)
-        labels[outside.repeat(HALVES, axis=0).repeat(HALVES, axis=1)] = OUTSIDE
+        for quarter in np.ndindex(HALVES, HALVES):
+            np.copyto(labels[quarter[0] :: HALVES, quarter[1] :: HALVES], OUTSIDE, where=outside)
         return labels
 
 

@@ -91,12 +91,14 @@ def _calmest(seen: Seen, settings: ConversionSettings) -> Strata:
     found = seen.borders
     best, least = seen.strata(found.best_level, settings.strata), np.inf
     for k in range(found.best, 0, -PER_OCTAVE):
-        level = float(found.level[k])
-        wrong = _error(seen.environment, seen.strata(level, settings.strata), settings) ** 2
         noise = squared_noise(found.variance[k])
+        if noise > least:  # whatever shadows would be wrong by
+            break
+        strata = seen.strata(float(found.level[k]), settings.strata)
+        wrong = _error(seen.environment, strata, settings) ** 2
         if wrong + noise < least:
-            best, least = seen.strata(level, settings.strata), wrong + noise
-        if noise > least or wrong < noise / 10:
+            best, least = strata, wrong + noise
+        if wrong < noise / 10:
             break
     return best
 
