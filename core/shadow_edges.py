@@ -132,7 +132,7 @@ class _Cells:
         centres: Floats,
     ) -> _Cells:
         count = len(centres)
-        axes = np.stack([*sphere.tangents(centres), centres], axis=-1)[owner]
+        axes = np.stack([*sphere.tangents(centres), centres], axis=-1).take(owner, axis=0)
         first, second, forward = np.einsum("pc,pca->ap", directions, axes)
         back = forward < 0
         signed = np.concatenate([light.T, light.sum(axis=1)[None]])
