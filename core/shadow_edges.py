@@ -233,9 +233,9 @@ def _places(sums: Floats, places: int) -> Floats:
     row = 2.0 * np.arange(len(dense))[:, None]
     wanted = np.arange(places + 1) / places
     after = np.searchsorted((dense + row).ravel(), (wanted + row).ravel()).reshape(len(dense), -1)
-    after = np.clip(after - np.arange(len(dense))[:, None] * (STEPS + 1), 1, STEPS)
-    low = np.take_along_axis(dense, after - 1, axis=1)
-    high = np.take_along_axis(dense, after, axis=1)
+    first = np.arange(len(dense))[:, None] * (STEPS + 1)
+    after = np.clip(after - first, 1, STEPS)
+    low, high = dense.take(after + first - 1), dense.take(after + first)
     return (after - 1 + (wanted - low) / (high - low)).reshape(*shape, places + 1)
 
 
