@@ -93,6 +93,8 @@ def _calmest(seen: Seen, settings: ConversionSettings) -> Strata:
     """From the border of least noise upwards, as long as noise and wrong shadows become less."""
     found, environment = seen.borders, seen.environment
     best, least = seen.strata(found.best_level, settings.strata), np.inf
+    if not found.best:
+        return best
     noise = squared_noise(found.variance[found.best])
     if _error_of_fewer(environment, best, settings) ** 2 < noise / LITTLE:
         return best
