@@ -71,9 +71,10 @@ class Sight:
         camera = self.scene.camera
         near, far = camera.data.clip_start, camera.data.clip_end
         columns, rows = PICTURE
+        through = _picture(self.scene)
         for ray in range(columns * rows):
             row, column = divmod(ray, columns)
-            direction = _through_picture(self.scene, column / (columns - 1), row / (rows - 1))
+            direction = through(column / (columns - 1), row / (rows - 1))
             start = camera.matrix_world.translation + direction * near
             hit, _, _, _, thing, _ = self.scene.ray_cast(self.graph, start, direction, distance=far)
             if not hit or thing.hide_render or not thing.visible_camera:
@@ -255,10 +256,20 @@ def is_all_met(scene: bpy.types.Scene, shown: Iterable[bpy.types.Object]) -> boo
 
 def _through_picture(scene: bpy.types.Scene, across: float, down: float) -> Vector:
     """The direction through a point of the picture, (0, 0) its upper left, in the scene's axes."""
+    return _picture(scene)(across, down)
+
+
+def _picture(scene: bpy.types.Scene) -> Callable[[float, float], Vector]:
+    """The same for many points."""
     camera = scene.camera
     top_right, bottom_right, bottom_left, top_left = camera.data.view_frame(scene=scene)
-    left, right = top_left.lerp(bottom_left, down), top_right.lerp(bottom_right, down)
-    return camera.matrix_world.to_quaternion() @ left.lerp(right, across).normalized()
+    turn = camera.matrix_world.to_quaternion()
+
+    def through(across: float, down: float) -> Vector:
+        left, right = top_left.lerp(bottom_left, down), top_right.lerp(bottom_right, down)
+        return turn @ left.lerp(right, across).normalized()
+
+    return through
 
 
 def camera_width(scene: bpy.types.Scene) -> int | None:

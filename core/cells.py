@@ -38,11 +38,12 @@ class Cells:
     width: int
     height: int
 
-    def labels(self) -> NDArray[np.int32]:
-        """The sun of each quarter of a pixel, OUTSIDE where there is none, (2 height, 2 width)."""
+    def labels(self) -> NDArray[np.signedinteger]:
+        """The sun of each quarter of a pixel, OUTSIDE where there is none, (2 height, 2 width), of
+        the smallest type that holds them."""
         shape = HALVES * self.height, HALVES * self.width
-        labels = np.full(shape, OUTSIDE, np.int32)
         squares, sun = self.taken.squares, self.taken.sun
+        labels = np.full(shape, OUTSIDE, np.min_scalar_type(-1 - int(sun.max(initial=0))))
         for side in np.unique(squares[:, 2]):
             mine = squares[:, 2] == side
             reach = np.arange(side)
@@ -53,7 +54,8 @@ class Cells:
         outside = np.ones(self.width * self.height, bool)
         outside[self.pixels] = False
         outside = outside.reshape(self.height, self.width)
-        labels[outside.repeat(HALVES, axis=0).repeat(HALVES, axis=1)] = OUTSIDE
+        for quarter in np.ndindex(HALVES, HALVES):
+            np.copyto(labels[quarter[0] :: HALVES, quarter[1] :: HALVES], OUTSIDE, where=outside)
         return labels
 
 

@@ -18,6 +18,8 @@ if TYPE_CHECKING:  # what draws outlines does not convert
 
 Floats = NDArray[np.float64]
 Runs = NDArray[np.uint16]
+Labels = NDArray[np.signedinteger]
+Places = NDArray[np.intp]
 
 MOST_RUNS = 32_768
 """Of region A, and of cells: a megabyte in memory, and drawn in no time. A noisy map has more, and
@@ -69,25 +71,25 @@ class Outlines:
 
 def outlines_of(conversion: Conversion) -> Outlines:
     """Of a conversion, as detailed as `MOST_RUNS` allows."""
-    region, region_size = _bounded(conversion.strata.region_a.astype(np.int32) - 1, True)
+    region, region_size = _bounded(conversion.strata.region_a.astype(np.int8) - 1, True)
     if conversion.cells is None:
         return Outlines(region, np.empty((0, 4), np.uint16), region_size, region_size)
     cells, cells_size = _bounded(conversion.cells.labels(), False)
     return Outlines(region, cells, region_size, cells_size)
 
 
-def runs_between(labels: NDArray[np.int32], outer: bool) -> Runs:
+def runs_between(labels: Labels, outer: bool) -> Runs:
     """Straight runs along the sides of pixels whose labels differ, (n, 4); see `Outlines`.
 
     labels: (H, W). outer: between something and OUTSIDE; else between two things. The columns wrap:
     a border at the seam is told at both ends. At a pole nothing has a border: it is one point.
     """
-    before, after = np.roll(labels, 1, axis=1), labels
-    upright = _differ(before, after, outer)
-    upright = np.concatenate([upright, upright[:, :1]], axis=1)
-    level = _differ(labels[:-1], labels[1:], outer)
-    x, top, bottom = _runs(upright.T)
-    y, left, right = _runs(level)
+    height, width = labels.shape
+    row, column = _borders(labels[:, :-1], labels[:, 1:], outer)
+    seam, _ = _borders(labels[:, -1:], labels[:, :1], outer)
+    column = np.concatenate([column + 1, np.zeros_like(seam), np.full_like(seam, width)])
+    x, top, bottom = _runs(column, np.concatenate([row, seam, seam]), height)
+    y, left, right = _runs(*_borders(labels[:-1], labels[1:], outer), width)
     found = [np.stack([x, top, x, bottom], axis=-1), np.stack([left, y + 1, right, y + 1], axis=-1)]
     return np.concatenate(found).astype(np.uint16)
 
@@ -117,7 +119,7 @@ def lines_in_image(directions: Floats) -> list[Floats]:
     return lines
 
 
-def _bounded(labels: NDArray[np.int32], outer: bool) -> tuple[Runs, tuple[int, int]]:
+def _bounded(labels: Labels, outer: bool) -> tuple[Runs, tuple[int, int]]:
     """Runs between labels, and on how many columns and rows."""
     runs = runs_between(labels, outer)
     while len(runs) > MOST_RUNS:
@@ -126,7 +128,7 @@ def _bounded(labels: NDArray[np.int32], outer: bool) -> tuple[Runs, tuple[int, i
     return runs, labels.shape[::-1]
 
 
-def _halved(labels: NDArray[np.int32]) -> NDArray[np.int32]:
+def _halved(labels: Labels) -> Labels:
     """Of each square of 2 x 2 the largest label."""
     height, width = labels.shape
     labels = np.pad(labels, ((0, height % 2), (0, width % 2)), mode="edge")
@@ -137,18 +139,24 @@ def _halved(labels: NDArray[np.int32]) -> NDArray[np.int32]:
     )
 
 
-def _differ(one: NDArray[np.int32], other: NDArray[np.int32], outer: bool) -> NDArray[np.bool_]:
-    outside = (one == OUTSIDE) | (other == OUTSIDE)
-    return (one != other) & (outside if outer else ~outside)
+def _borders(one: Labels, other: Labels, outer: bool) -> tuple[Places, Places]:
+    """Rows and columns where two labels differ, and one or none of them is OUTSIDE, in reading
+    order: first all places where they differ, which are few."""
+    rows, columns = np.divmod(np.flatnonzero(one != other), max(one.shape[1], 1))
+    outside = (one[rows, columns] == OUTSIDE) | (other[rows, columns] == OUTSIDE)
+    wanted = outside if outer else ~outside
+    return rows[wanted], columns[wanted]
 
 
-def _runs(
-    marked: NDArray[np.bool_],
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Row, first column and the column behind the last of each run of marked places in a row."""
-    steps = np.diff(np.pad(marked, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-    rows, first = np.nonzero(steps == 1)
-    return rows, first, np.nonzero(steps == -1)[1]
+def _runs(line: Places, place: Places, length: int) -> tuple[Places, Places, Places]:
+    """Of places in lines, each `length` long: line, first place and the place behind the last of
+    each run of them in a line."""
+    # With a gap between two lines.
+    at = np.sort(line * (length + 1) + place)
+    begins = np.flatnonzero(np.diff(at, prepend=-2) != 1)
+    ends = np.append(begins[1:], len(at)) - 1 if len(at) else begins
+    lines, first = np.divmod(at[begins], length + 1)
+    return lines, first, at[ends] - lines * (length + 1) + 1
 
 
 def _in_image(runs: Runs, size: tuple[int, int]) -> Floats:

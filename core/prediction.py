@@ -70,11 +70,13 @@ class Surfaces:
         cones = np.concatenate([-self.axes.T / sine, [cosine / sine], [half]])
         light, normals = directions * flux[:, None], self.normals.T
         total = np.zeros(len(self.radii))
+        space = np.empty((2, min(AT_ONCE, len(directions)), len(total)))
         for start in range(0, len(directions), AT_ONCE):
-            seen = pieces[start : start + AT_ONCE] @ cones
-            np.minimum(np.maximum(seen, 0, out=seen), 1, out=seen)
-            given = light[start : start + AT_ONCE] @ normals
-            seen *= np.maximum(given, 0, out=given)
+            some = slice(start, start + AT_ONCE)
+            seen, given = space[:, : len(pieces[some])]
+            np.clip(np.matmul(pieces[some], cones, out=seen), 0, 1, out=seen)
+            np.maximum(np.matmul(light[some], normals, out=given), 0, out=given)
+            seen *= given
             total += seen.sum(axis=0)
         return total
 
@@ -198,22 +200,23 @@ def _pieces(suns: Sequence[Sun]) -> tuple[Floats, Floats, Floats]:
     """Each sun, one at least, as points in a spiral over its disc: directions, luminous light and
     half widths."""
     count = int(np.clip(PIECES // max(len(suns), 1), 32, 1024))
+    part = (np.arange(count) + 0.5) / count
+    turn = np.arange(count) * (np.pi * (3 - np.sqrt(5)))
+    across, up = np.cos(turn)[:, None], np.sin(turn)[:, None]
+    axes = sphere.tangents(np.array([sun.to_light for sun in suns]))
     found = []
-    for sun in suns:
+    for sun, first, second in zip(suns, *axes, strict=True):
         light = float(sun.scalar_irradiance @ LUMINANCE_WEIGHTS)
         if sun.angular_diameter == 0:
             found.append((sun.to_light[None], np.array([light]), np.array([SHARP])))
             continue
-        part = (np.arange(count) + 0.5) / count
-        turn = np.arange(count) * (np.pi * (3 - np.sqrt(5)))
         cap = 2 * np.sin(sun.angular_diameter / 4) ** 2  # 1 - cos of the half-angle
         along = 1 - part * cap
         aside = np.sqrt(1 - along**2)
-        first, second = sphere.tangents(sun.to_light)
         directions = (
             along[:, None] * sun.to_light
-            + (aside * np.cos(turn))[:, None] * first
-            + (aside * np.sin(turn))[:, None] * second
+            + aside[:, None] * across * first
+            + aside[:, None] * up * second
         )
         half = np.sqrt(2 * np.pi * cap / count) / 2
         found.append((directions, np.full(count, light / count), np.full(count, half)))

@@ -29,6 +29,9 @@ for a single light. What surfaces add of noise is the second moment less this (s
 CALM_PEAK = 1000.0
 """Brightest pixel in means of the residual up to which a small table misses nothing that counts."""
 
+AT_ONCE = 32
+"""Rows of a map that are looked at together: few enough for a processor's own memory."""
+
 SMALL_TABLE = 512
 """Width of the sampling table for a residual that is calm, but not calm enough to do without."""
 
@@ -112,14 +115,20 @@ def contrast(
 ) -> tuple[float, float]:
     """(mean(L^2) / mean(L)^2, max(L) / mean(L)) of a map's luminance over the sphere, or over the
     visible part of it."""
-    lum = luminance(radiance)
-    solid = sphere.row_solid_angles(lum.shape[1], lum.shape[0])
-    area = 4 * np.pi
-    if visible:
-        lum = visible.of(lum)
-        area = float(weighted_sum(solid, visible.pixels(lum.shape[1], lum.shape[0]).sum(axis=1)))
-    mean = float(weighted_sum(solid, lum.sum(axis=1))) / area
+    height, width = radiance.shape[:2]
+    solid = sphere.row_solid_angles(width, height)
+    area, seen = 4 * np.pi, visible and visible.pixels(width, height)
+    if seen is not None:
+        area = float(weighted_sum(solid, seen.sum(axis=1)))
+    light, square, peak = np.empty(height), np.empty(height), 0.0
+    for top in range(0, height, AT_ONCE):
+        some = slice(top, top + AT_ONCE)
+        lum = luminance(radiance[some])
+        if seen is not None:
+            lum *= seen[some]
+        light[some], peak = lum.sum(axis=1), max(peak, float(lum.max()))
+        square[some] = np.multiply(lum, lum, out=lum).sum(axis=1)
+    mean = float(weighted_sum(solid, light)) / area
     if mean == 0:
         return 1.0, 1.0
-    square = float(weighted_sum(solid, (lum**2).sum(axis=1))) / area
-    return square / mean**2, float(lum.max()) / mean
+    return float(weighted_sum(solid, square)) / area / mean**2, peak / mean

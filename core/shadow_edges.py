@@ -132,7 +132,7 @@ class _Cells:
         centres: Floats,
     ) -> _Cells:
         count = len(centres)
-        axes = np.stack([*sphere.tangents(centres), centres], axis=-1)[owner]
+        axes = np.stack([*sphere.tangents(centres), centres], axis=-1).take(owner, axis=0)
         first, second, forward = np.einsum("pc,pca->ap", directions, axes)
         back = forward < 0
         signed = np.concatenate([light.T, light.sum(axis=1)[None]])
@@ -151,20 +151,31 @@ def _turned_edges(cells: _Cells, turn: Floats, places: int) -> tuple[Floats, Flo
     aside = np.cos(turn)[:, None] * cells.first
     aside += np.sin(turn)[:, None] * cells.second
     # Edges turn about an axis through the observer: half the angle's tangent is the place.
-    reach = np.sqrt(aside * aside + cells.forward**2)
-    place = aside
-    place /= reach + np.abs(cells.forward)
-    place[:, cells.forward < 0] *= -1
-    width = cells.half_width * (1 + place * place) / (2 * np.maximum(reach, 1e-3))
-    low = np.minimum.reduceat(place - width, cells.starts, axis=1)
-    high = np.maximum.reduceat(place + width, cells.starts, axis=1)
+    reach = aside * aside
+    reach += cells.forward**2
+    np.sqrt(reach, out=reach)
+    place, other = aside, reach + np.abs(cells.forward)
+    place /= other
+    back = cells.forward < 0
+    if back.any():
+        place[:, back] *= -1
+    width = np.multiply(place, place, out=other)
+    width += 1
+    width *= cells.half_width
+    np.maximum(reach, 1e-3, out=reach)
+    reach *= 2
+    width /= reach
+    low = np.minimum.reduceat(np.subtract(place, width, out=reach), cells.starts, axis=1)
+    high = np.maximum.reduceat(np.add(place, width, out=reach), cells.starts, axis=1)
     # So that an edge on either side lets all through, or nothing.
     margin = 0.03 * (high - low) + 0.002
     low, high = np.maximum(low - margin, -1), np.minimum(high + margin, 1)
     step = (high - low) / STEPS
-    place -= low[:, owner]
-    place /= step[:, owner]
-    width /= step[:, owner]
+    of_each = low.take(owner, axis=1)
+    place -= of_each
+    of_each = step.take(owner, axis=1)
+    place /= of_each
+    width /= of_each
     sums = _sums_before(place, width, cells.signed, owner, count)
     sums = sums.reshape(turns, count, STEPS + 1, -1)
     ends = _places(sums[..., -1], places)
@@ -222,9 +233,9 @@ def _places(sums: Floats, places: int) -> Floats:
     row = 2.0 * np.arange(len(dense))[:, None]
     wanted = np.arange(places + 1) / places
     after = np.searchsorted((dense + row).ravel(), (wanted + row).ravel()).reshape(len(dense), -1)
-    after = np.clip(after - np.arange(len(dense))[:, None] * (STEPS + 1), 1, STEPS)
-    low = np.take_along_axis(dense, after - 1, axis=1)
-    high = np.take_along_axis(dense, after, axis=1)
+    first = np.arange(len(dense))[:, None] * (STEPS + 1)
+    after = np.clip(after - first, 1, STEPS)
+    low, high = dense.take(after + first - 1), dense.take(after + first)
     return (after - 1 + (wanted - low) / (high - low)).reshape(*shape, places + 1)
 
 

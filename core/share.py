@@ -8,7 +8,7 @@ means truer shadows, until too few suns stand for too much.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import hypot
 
@@ -41,6 +41,9 @@ CLEARLY = 0.98
 
 ROUGH = 4096
 """Patches with which shares are compared: their order is what counts."""
+
+LITTLE = 10
+"""So many times less wrong than noise is, a higher border is not worth looking at."""
 
 USUAL_LIGHTS = 16
 """For as many lights the share is chosen where their number is chosen after it."""
@@ -89,17 +92,35 @@ def choose_strata(
 
 def _calmest(seen: Seen, settings: ConversionSettings) -> Strata:
     """From the border of least noise upwards, as long as noise and wrong shadows become less."""
-    found = seen.borders
+    found, environment = seen.borders, seen.environment
     best, least = seen.strata(found.best_level, settings.strata), np.inf
+    if not found.best:
+        return best
+    noise = squared_noise(found.variance[found.best])
+    if _error_of_fewer(environment, best, settings) ** 2 < noise / LITTLE:
+        return best
     for k in range(found.best, 0, -PER_OCTAVE):
-        level = float(found.level[k])
-        wrong = _error(seen.environment, seen.strata(level, settings.strata), settings) ** 2
         noise = squared_noise(found.variance[k])
+        if noise > least:  # whatever shadows would be wrong by
+            break
+        strata = seen.strata(float(found.level[k]), settings.strata)
+        wrong = _error(environment, strata, settings) ** 2
         if wrong + noise < least:
-            best, least = seen.strata(level, settings.strata), wrong + noise
-        if noise > least or wrong < noise / 10:
+            best, least = strata, wrong + noise
+        if wrong < noise / LITTLE:
             break
     return best
+
+
+def _error_of_fewer(
+    environment: EnvironmentMap, strata: Strata, settings: ConversionSettings
+) -> float:
+    """At least what is wrong of as many suns as are allowed: of the next lower power of two, which
+    another number of them has often been asked for too."""
+    fewer = replace(settings, lights=1 << (settings.most_lights.bit_length() - 1))
+    return strata.once(
+        ("error", fewer.lights, fewer.shape), lambda: _error(environment, strata, fewer)
+    )
 
 
 def _truest(environment: EnvironmentMap, settings: ConversionSettings) -> Strata:

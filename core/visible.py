@@ -94,7 +94,10 @@ def visible_part(environment: EnvironmentMap, looks: Looks) -> VisiblePart | Non
     if not len(looks.escaped):
         return None
     centres = sphere.pixel_centres(np.arange(2 * ROWS * ROWS), *_SIZE)
-    far = (centres @ looks.escaped.T).max(axis=1) <= np.cos(NEAR)
+    # A row of cells at a time: of larger products BLAS makes threads, which then wait busily.
+    rows = np.split(centres, ROWS)
+    nearest = np.concatenate([(row @ looks.escaped.T).max(axis=1) for row in rows])
+    far = nearest <= np.cos(NEAR)
     hidden = _hidden(environment, np.flatnonzero(far), looks) if far.any() else []
     if not len(hidden):
         return None

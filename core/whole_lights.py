@@ -70,20 +70,31 @@ def suns_for_whole_lights(
     left in the residual, down to one for each sun, if noise is the lesser evil.
     """
     groups = light.once("whole lights", lambda: whole_lights(light, strata))
-    count, lights, least = groups.noisy, settings.most_lights, np.inf
-    while True:
+    lights, least = settings.most_lights, np.inf
+    counts = _fewer_and_fewer(groups.noisy, lights)
+    noise = [squared_noise(groups.variance[count] + OTHERWISE) for count in counts]
+    for k, count in enumerate(counts):
+        if min(noise[k:]) >= least:  # however well suns stand for the rest
+            break
         chosen = choose_suns(groups.brightest(count), strata, settings)
-        evil = chosen.predicted_error**2 + squared_noise(groups.variance[count] + OTHERWISE)
+        evil = chosen.predicted_error**2 + noise[k]
         if evil < least:
             best, least = (count, chosen), evil
-        if count <= lights or chosen.predicted_error <= (settings.tolerance or TOLERANCE) / 100:
+        if chosen.predicted_error <= (settings.tolerance or TOLERANCE) / 100:
             break
-        count = max(count // 2, lights)
     count, chosen = best
     why = "too faint to make noise"
     if count < groups.noisy:
         why = f"beyond the limit of {lights} lights"
     return groups.brightest(count), chosen, groups.note(count, why)
+
+
+def _fewer_and_fewer(count: int, lights: int) -> list[int]:
+    """A count, half of it, ... down to a number of lights, or the count alone if that is less."""
+    counts = [count]
+    while counts[-1] > lights:
+        counts.append(max(counts[-1] // 2, lights))
+    return counts
 
 
 def whole_lights(light: RegionLight, strata: Strata) -> WholeLights:

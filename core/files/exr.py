@@ -229,7 +229,7 @@ def halved(radiance: NDArray[np.float32]) -> NDArray[np.float16] | None:
         return None
     half = radiance.astype(np.float16)
     whole = scalar_irradiance(radiance)
-    lost = np.abs(scalar_irradiance(half.astype(np.float32)) - whole)
+    lost = np.abs(scalar_irradiance(half) - whole)
     return half if (lost <= HALF_ENERGY * whole).all() else None
 
 

@@ -66,8 +66,9 @@ class PatchCells:
 def cells_of(light: EdgeLight, owner: Owner) -> PatchCells:
     """Cells by their moments; those that have lost all patches are left out."""
     occupied = np.bincount(owner) > 0
-    owner = (np.cumsum(occupied) - 1)[owner]
     count = int(occupied.sum())
+    if count < len(occupied):
+        owner = (np.cumsum(occupied) - 1)[owner]
     held = sums_of(owner, light.held, count)
     to_light, shortfall = light.moments(held, np.arange(len(owner)), owner)
     unknown, none = np.full((count, JUDGED), np.inf), np.zeros((count, JUDGED))

@@ -38,6 +38,10 @@ GENTLER = 0.5
 among lights of strong colours cells tear each other apart."""
 
 
+LAST = 8
+"""Of so many numbers of cells the last ones are kept: an eighth of a megabyte each at most."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Trial:
     """Cells on their way. together: see `edge_balance.TOGETHER`."""
@@ -95,15 +99,25 @@ class EdgeSplit:
         self.patches = patches
         self._whole, self._truest = whole, Cuts(parts, squared_errors)
         lights = (whole,) if parts is whole else (whole, parts)
+        self._last: dict[tuple[int, bool], PatchCells] = {}
         self._beginnings = [(Balance(light), Cuts(light, widths)) for light in lights]
 
     def cells(self, count: int, allowed: float = 0.0, level: bool = False) -> PatchCells:
         """See `edge_split`."""
 
+        made = self._enough(count, allowed), level
+        if made not in self._last:  # often another number that is asked for comes to the same
+            if len(self._last) == LAST:
+                del self._last[next(iter(self._last))]
+            self._last[made] = self._balanced(*made)
+        return self._last[made]
+
+    def _balanced(self, enough: int, level: bool) -> PatchCells:
+        """The best of `enough` cells that were tried."""
+
         def error(trial: _Trial) -> float:
             return trial.cells.level_error if level else trial.cells.error
 
-        enough = self._enough(count, allowed)
         owner = self._truest.owner(enough)
         cut = _Trial(self._beginnings[0][0], cells_of(self._whole, owner)).after(0)
         if enough == 1:

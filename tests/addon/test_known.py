@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 from sunsplit.addon import known
+from sunsplit.addon.scene import convert_scene
+from sunsplit.addon.trace import TAG
+from sunsplit.core.settings import ConversionSettings
 from tests.blender import fresh_scene, hdri_world, suns, to_light, write_map
 from tests.maps import direction, paint_disc, sky
 
@@ -49,6 +52,46 @@ def test_other_settings_are_another_conversion_of_the_same_map(scene, monkeypatc
     monkeypatch.setattr("sunsplit.addon.images.load", None)  # would raise
     bpy.ops.sunsplit.convert(lights=4, share=0.9)
     assert len(suns(scene)) > 1
+
+
+def test_converting_again_gives_what_converting_afresh_does(tmp_path):
+    """To the bit, of a map so wide that it is looked at narrowed."""
+    random = np.random.default_rng(0)
+    pixels = sky(2048, 0.3) * random.random((1024, 2048, 1)) ** 2
+    for place in ((40, 35), (140, 15), (-70, 60)):
+        paint_disc(pixels, direction(*place), 2, random.random(3) * 900, fine=2)
+    path = write_map(tmp_path / "wide.exr", pixels)
+    choices = [{"lights": 8}, {"lights": 5}, {"share": 0.5}, {"share": 0.6}, {}]
+    known.forget()
+    scene = fresh_scene()
+    hdri_world(scene, path)
+    again = [_made(scene, choice) for choice in choices]
+    for choice, one in zip(choices, again, strict=True):
+        known.forget()
+        scene = fresh_scene()
+        hdri_world(scene, path)
+        other = _made(scene, choice)
+        assert np.array_equal(one.pop("residual"), other.pop("residual"))
+        assert one == other
+
+
+def _made(scene, choice):
+    """All that a conversion leaves in a scene, as numbers and text."""
+    convert_scene(scene, ConversionSettings(**choice))
+    state = scene.sunsplit
+    image = next(i for i in bpy.data.images if i.get(TAG) == "residual" and i.users)
+    pixels = np.empty(image.size[0] * image.size[1] * image.channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    return {
+        "residual": pixels,
+        "outlines": state.outlines,
+        "report": state.report,
+        "lamps": [
+            (lamp.name, lamp.data.energy, *lamp.data.color, lamp.data.angle, *to_light(lamp))
+            for lamp in suns(scene)
+        ],
+        "sampling": scene.world.cycles.sampling_method,
+    }
 
 
 def test_a_file_with_other_content_is_another_map(scene, tmp_path):

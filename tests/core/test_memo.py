@@ -24,7 +24,10 @@ def sunny():
 CHOICES = [
     {},
     {"lights": 3},
+    *({"lights": lights} for lights in (4, 5, 9, 12, 16, 17, 2, 12)),
+    {"lights": 6, "shape": "point"},
     {"lights": 3, "share": 0.4},
+    {"tolerance": 3},
     {"share": 0.7},
     {"lights": 5, "target": "eevee"},
     {"lights": 5, "strata": 4, "method": "penrose", "per_stratum": True},

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from sunsplit.core import ConversionSettings, convert, load
+from sunsplit.core.noise import OTHERWISE, squared_noise
+from sunsplit.core.placement.choice import choose_suns
+from sunsplit.core.region import light_of_region_a
 from sunsplit.core.sampling import contrast
+from sunsplit.core.settings import TOLERANCE
+from sunsplit.core.share import choose_strata
 from sunsplit.core.tolerances import ACCOUNT
+from sunsplit.core.whole_lights import suns_for_whole_lights, whole_lights
 from tests.maps import direction, environment, paint_disc, sky
 
 
@@ -97,6 +103,26 @@ def test_specks_that_few_lights_cannot_stand_for_stay(sunrise):
     assert len(conversion.suns) == 2
     assert conversion.predicted_error < 0.01
     assert "beyond the limit of 2 lights" in " ".join(conversion.notes)
+
+
+@pytest.mark.parametrize("lights", [1, 2, 5])
+def test_of_numbers_of_specks_none_that_could_be_best_is_left_out(lights):
+    """Against trying all of them."""
+    world, settings = environment(glittering()), ConversionSettings(lights=lights)
+    strata = choose_strata(world, settings)
+    light = light_of_region_a(world, strata, settings.filled)
+    groups = whole_lights(light, strata)
+    evils, count = {}, groups.noisy
+    while True:
+        wrong = choose_suns(groups.brightest(count), strata, settings).predicted_error
+        evils[count] = wrong**2 + squared_noise(groups.variance[count] + OTHERWISE)
+        if count <= lights or wrong <= TOLERANCE / 100:
+            break
+        count = max(count // 2, lights)
+    taken, _, _ = suns_for_whole_lights(light, strata, settings)
+    best = min(evils, key=evils.__getitem__)
+    assert len(evils) > 1
+    assert np.array_equal(taken.pixels, groups.brightest(best).pixels)
 
 
 def test_a_speck_that_makes_no_noise_stays():
