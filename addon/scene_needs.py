@@ -5,14 +5,17 @@ Whatever cannot be told is needed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import bpy
 
 from ..core.environment import whole_part, whole_part_from
-from .rays import Sight, camera_width, is_all_met, stands_still
+from .moments import Sight, sight_of
+from .ordinary import is_all_met, is_seen_as_rendered, shown_things
 from .rig import rig_of
+from .steps import Steps, run_at_once
+from .views import finest_width, is_ordinary, view_of
 
 SHARP = 0.25
 """Roughness below which a surface may show single pixels of a wide map."""
@@ -33,13 +36,15 @@ class SceneNeeds:
     """camera_sees_world: or a render may show it behind transparent things. mirrors: something
     reflects or refracts sharply. other_lights: something but the world and lamps of conversions
     gives light. camera_width: pixels around the sphere that a picture can tell apart; None: any.
-    sight: the scene for rays that ask what light reaches; None: they would not tell."""
+    sight: the scene for rays that ask what light reaches; None: they would not tell. looked: where
+    anything moves, how many frames were looked at, and the first and last of their range."""
 
     camera_sees_world: bool
     mirrors: bool
     other_lights: bool
     camera_width: int | None = None
     sight: Sight | None = field(default=None, compare=False)
+    looked: tuple[int, int, int] | None = None
 
     def width_for_camera(self, width: int) -> int:
         """Of the map that the camera sees, for a map of this width."""
@@ -59,43 +64,59 @@ ALL = SceneNeeds(camera_sees_world=True, mirrors=True, other_lights=True)
 
 
 def needs_of(scene: bpy.types.Scene) -> SceneNeeds:
-    """Look at a scene: its camera, lamps, materials and shapes."""
+    """Look at a scene, all at once: see `needs_steps`."""
+    return run_at_once(needs_steps(scene))
+
+
+def needs_steps(scene: bpy.types.Scene) -> Steps[SceneNeeds]:
+    """Look at a scene: its camera, lamps, materials and shapes; in several frames where they
+    move."""
     own = {entry.lamp for entry in scene.sunsplit.lamps} | set(rig_of(scene.sunsplit.sky))
-    shown = list(_shown(thing for thing in scene.objects if thing not in own))
+    shown = list(shown_things(thing for thing in scene.objects if thing not in own))
     trees = _trees(scene, shown)
     nodes = [node for tree in trees for node in _nodes(tree)]
     if any(tree.animation_data for tree in trees) or any(node.type == "SCRIPT" for node in nodes):
         return ALL
-    sight = _sight(scene, shown)
+    sight = None
+    if is_seen_as_rendered(scene, shown):
+        clear = frozenset(thing.name for thing in shown if _lets_light_through(thing))
+        sight = sight_of(scene, shown, clear)
+    sees_world = yield from _sees_world(scene, nodes, sight)
     return SceneNeeds(
-        camera_sees_world=_sees_world(scene, nodes, sight),
+        camera_sees_world=sees_world,
         mirrors=any(_is_sharp(node) for node in nodes),
         other_lights=any(thing.type == "LIGHT" for thing in shown)
         or any(_shines(node) for node in nodes),
-        camera_width=camera_width(scene),
-        sight=sight if sight and _is_told_by_rays(scene, shown, nodes) else None,
+        camera_width=_camera_width(scene, sight),
+        sight=sight if sight and _is_told_by_rays(scene, shown, nodes, sight) else None,
+        looked=(len(sight.moments), *sight.frames) if sight and sight.frames else None,
     )
 
 
-def _sight(scene: bpy.types.Scene, shown: list[bpy.types.Object]) -> Sight | None:
-    """The scene for rays, where they tell what renders will show."""
-    if not stands_still(scene, shown):
+def _camera_width(scene: bpy.types.Scene, sight: Sight | None) -> int | None:
+    if sight:
+        return finest_width(scene, sight.views)
+    camera = scene.camera
+    if not is_ordinary(camera) or scene.render.use_multiview:
         return None
-    graph = bpy.context.evaluated_depsgraph_get()
-    if graph.scene != scene:
+    if any(marker.camera for marker in scene.timeline_markers):
         return None
-    clear = {thing.name for thing in shown if _lets_light_through(thing)}
-    return Sight(scene, graph, frozenset(clear))
+    if scene.animation_data or camera.data.animation_data:
+        return None
+    return finest_width(scene, [view_of(scene, camera)])
 
 
 def _is_told_by_rays(
-    scene: bpy.types.Scene, shown: list[bpy.types.Object], nodes: list[bpy.types.Node]
+    scene: bpy.types.Scene,
+    shown: list[bpy.types.Object],
+    nodes: list[bpy.types.Node],
+    sight: Sight,
 ) -> bool:
     """Whether rays meet all that light would meet: no fog, and nothing that only renders show."""
     if any(layer.material_override for layer in scene.view_layers):
         return False
     foggy = any(n.type == "OUTPUT_MATERIAL" and n.inputs["Volume"].is_linked for n in nodes)
-    return not foggy and is_all_met(scene, shown)
+    return not foggy and is_all_met(scene, shown, sight.shapes)
 
 
 def _lets_light_through(thing: bpy.types.Object) -> bool:
@@ -110,15 +131,6 @@ def _is_translucent(node: bpy.types.Node) -> bool:
         inside = ("Transmission Weight", "Subsurface Weight")
         return _is_seen_through(node) or any(_is_above(node, name, 0) for name in inside)
     return _is_seen_through(node) or node.type in TRANSLUCENT
-
-
-def _shown(things: Iterable[bpy.types.Object]) -> Iterator[bpy.types.Object]:
-    """Things that renders may show, and those in collections that they are instances of."""
-    for thing in things:
-        if not thing.hide_render:
-            yield thing
-            if thing.instance_collection:
-                yield from _shown(thing.instance_collection.all_objects)
 
 
 def _trees(scene: bpy.types.Scene, shown: list[bpy.types.Object]) -> list[bpy.types.NodeTree]:
@@ -177,10 +189,12 @@ def _is_seen_through(node: bpy.types.Node) -> bool:
     return node.type in ("BSDF_TRANSPARENT", "BSDF_RAY_PORTAL", "HOLDOUT")
 
 
-def _sees_world(scene: bpy.types.Scene, nodes: list[bpy.types.Node], sight: Sight | None) -> bool:
+def _sees_world(
+    scene: bpy.types.Scene, nodes: list[bpy.types.Node], sight: Sight | None
+) -> Steps[bool]:
     """Whether a camera ray may reach the world."""
     if scene.render.film_transparent:
         return False
     if sight is None or any(_is_seen_through(node) for node in nodes):
         return True
-    return sight.camera_sees_world()
+    return (yield from sight.camera_sees_world())
