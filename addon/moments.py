@@ -21,6 +21,10 @@ from .views import View, view_of
 PICTURE = 48, 27
 """Rays through a camera's picture that look for the world."""
 
+IN_TURN = 4
+"""Frames that share these rays, as those next to each other show nearly the same: each has other
+ones."""
+
 AT_A_TIME = 32
 """Rays between two moments for the window."""
 
@@ -30,11 +34,14 @@ COARSE = 12, 7
 FEWEST = 5
 """Frames that are looked at where anything moves, if there are so many."""
 
-MOST = 25
+MOST = 30
 """With more, looking takes too long."""
 
 OWN_SIZE = 0.25
 """So far a thing may move between two of them, as a part of its own size."""
+
+OVERLAP = 0.5
+"""Of a picture, at least, is shown by that of the next frame that is looked at, too."""
 
 STEPS = 8
 """So many panes may lie behind each other."""
@@ -63,15 +70,18 @@ class Moment:
     crowds: tuple[Crowd, ...]
     see_through: frozenset[str]
 
-    def camera_sees_world(self) -> Steps[bool]:
-        """Whether any ray through a grid over the picture leaves the scene."""
+    def camera_sees_world(self, in_turn: int) -> Steps[bool]:
+        """Whether any ray through a grid over the picture leaves the scene. in_turn: moments that
+        share the grid."""
         for ray, (start, direction) in enumerate(_rays(self.view, *PICTURE)):
+            if (ray + ray // PICTURE[0] + self.number) % in_turn:
+                continue
             hit = self._nearest(start, direction, self.view.far)
             if hit is None or any(thing.hide_render for thing in hit.things):
                 return True
             if not all(thing.visible_camera for thing in hit.things):
                 return True
-            if ray % AT_A_TIME == 0:
+            if ray % AT_A_TIME < in_turn:
                 yield
         return False
 
@@ -121,8 +131,9 @@ class Sight:
 
     def camera_sees_world(self) -> Steps[bool]:
         """Whether it does in any frame that is looked at."""
+        in_turn = IN_TURN if len(self.moments) > IN_TURN else 1
         for moment in self.moments:
-            if (yield from moment.camera_sees_world()):
+            if (yield from moment.camera_sees_world(in_turn)):
                 return True
         return False
 
@@ -226,10 +237,11 @@ class _Choice:
         away = np.linalg.norm(from_here - np.array(view.place), axis=-1)
         allowed = np.minimum(OWN_SIZE * size, np.tan(NEAR) * away)
         travel = np.tan(NEAR) * _depth(view, (self.still, crowd))
+        turn = max(NEAR, (1 - OVERLAP) * _narrowest(view))
 
         def near(number: int) -> bool:
             other = self.readings[number].view
-            if (other.place - view.place).length > travel or _turned(view, other) > NEAR:
+            if (other.place - view.place).length > travel or _turned(view, other) > turn:
                 return False
             moved = np.linalg.norm(_corners(self.crowd(number)) - from_here, axis=-1)
             return bool((moved <= allowed).all())
@@ -255,6 +267,12 @@ def _turned(one: View, other: View) -> float:
         (one.turn @ here).angle(other.turn @ there)
         for here, there in zip(one.corners, other.corners, strict=True)
     )
+
+
+def _narrowest(view: View) -> float:
+    """Across a picture, or down, whichever is less, in radians."""
+    top_right, bottom_right, _, top_left = view.corners
+    return min(top_right.angle(top_left), top_right.angle(bottom_right))
 
 
 def _rays(view: View, columns: int, rows: int) -> Iterable[tuple[Vector, Vector]]:

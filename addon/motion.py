@@ -70,11 +70,12 @@ def _is_reshaped(thing: bpy.types.Object) -> bool:
     keys = getattr(thing.data, "shape_keys", None)
     if _is_animated(keys) or (thing.type == "MESH" and _is_animated(thing.data)):
         return True
+    # A mirror that moves, or moving past one that does not: either makes another shape.
+    others = list(_shaped_by(thing))
     return any(
-        moves(other) or (moves(thing) and other != thing)
-        for other in _shaped_by(thing)
-        if isinstance(other, bpy.types.Object)
-    ) or any(_is_animated(other) for other in _shaped_by(thing))
+        _is_animated(other) or (isinstance(other, bpy.types.Object) and moves(other))
+        for other in others
+    ) or bool(others and moves(thing))
 
 
 def _shaped_by(thing: bpy.types.Object) -> Iterator[bpy.types.ID]:

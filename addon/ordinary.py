@@ -47,31 +47,37 @@ def is_all_met(
 ) -> bool:
     """Whether rays meet every surface that renders show. shapes: that they meet."""
     shown, own = list(shown), set(scene.objects)
-    met: dict[bpy.types.Object, set[bpy.types.Object]] = {}
-    for shape in shapes:
-        if len(shape.things) > 1:
-            met.setdefault(shape.things[1], set()).add(shape.things[0])
+    makers = [thing for thing in shown if thing.instance_type != "NONE"]
     return all(
         thing.type in SOLID
         and thing.mode != "EDIT"
         and (thing.type != "MESH" or thing not in own or thing.visible_get())
-        and (thing.instance_type == "NONE" or _is_whole(thing, own, met.get(thing, set())))
         for thing in shown
-    )
+    ) and _are_instances_met([maker for maker in makers if maker in own], makers, shapes)
 
 
-def _is_whole(
-    maker: bpy.types.Object, own: set[bpy.types.Object], met: set[bpy.types.Object]
+def _are_instances_met(
+    outermost: list[bpy.types.Object], makers: list[bpy.types.Object], shapes: Iterable[Shape]
 ) -> bool:
-    """Whether all of a collection is met where there is an instance of it."""
-    made = maker.instance_collection
-    if maker.instance_type != "COLLECTION" or not made:
+    """Whether all of a collection is met wherever there is an instance of it. outermost: those of
+    all makers of instances that are not instances themselves."""
+    if not all(_makes_what_is_seen(maker) for maker in makers):
         return False
-    if any(part.hide_render for part in (made, *made.children_recursive)):
+    met: dict[bpy.types.Object, set[bpy.types.Object]] = {}
+    for shape in shapes:
+        if len(shape.things) > 1:
+            met.setdefault(shape.things[1], set()).add(shape.things[0])
+    for made in {maker.instance_collection for maker in makers}:
+        if any(part.hide_render for part in (made, *made.children_recursive)):
+            return False
+    parts = {maker.instance_collection: set() for maker in outermost}
+    for made, those in parts.items():
+        things = shown_things(made.all_objects)
+        those |= {thing for thing in things if thing.type == "MESH" and len(thing.data.polygons)}
+    return all(met.get(maker, set()) >= parts[maker.instance_collection] for maker in outermost)
+
+
+def _makes_what_is_seen(maker: bpy.types.Object) -> bool:
+    if maker.instance_type != "COLLECTION" or not maker.instance_collection:
         return False
-    if not all(getattr(maker, f"visible_{ray}") for ray in RAYS):
-        return False
-    if maker not in own:  # an instance in instances: asked of the outermost
-        return True
-    parts = shown_things(made.all_objects)
-    return met >= {part for part in parts if part.type == "MESH" and len(part.data.polygons)}
+    return all(getattr(maker, f"visible_{ray}") for ray in RAYS)

@@ -72,7 +72,8 @@ def needs_steps(scene: bpy.types.Scene) -> Steps[SceneNeeds]:
     """Look at a scene: its camera, lamps, materials and shapes; in several frames where they
     move."""
     own = {entry.lamp for entry in scene.sunsplit.lamps} | set(rig_of(scene.sunsplit.sky))
-    shown = list(shown_things(thing for thing in scene.objects if thing not in own))
+    those = shown_things(thing for thing in scene.objects if thing not in own)
+    shown = list(dict.fromkeys(those))  # once each, however many instances there are
     trees = _trees(scene, shown)
     nodes = [node for tree in trees for node in _nodes(tree)]
     if any(tree.animation_data for tree in trees) or any(node.type == "SCRIPT" for node in nodes):

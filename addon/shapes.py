@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 MOST_SHAPES = 30_000
 """With more, to sort them takes too long."""
 
-FEW = 8
+FEW = 24
 """So many shapes are asked without asking for their boxes: that is sooner done."""
 
 CROWD = 32
@@ -59,16 +59,20 @@ class Shape:
         return self.box @ np.array(matrix.to_3x3()).T + np.array(matrix.translation)
 
     @cached_property
-    def inward(self) -> Matrix | None:
-        """From the scene's axes to its own; None: it is flattened to nothing."""
-        return self.matrix.inverted(None)
+    def inward(self) -> tuple[Matrix, Matrix] | None:
+        """From the scene's axes to its own, of places and of directions; None: it is flattened to
+        nothing."""
+        try:
+            inward = self.matrix.inverted()
+        except ValueError:
+            return None
+        return inward, inward.to_3x3()
 
     def hit(self, start: Vector, direction: Vector) -> Hit | None:
         """Where a ray meets it first."""
-        inward = self.inward
-        if inward is None:
+        if self.inward is None:
             return None
-        turn = inward.to_3x3()
+        inward, turn = self.inward
         met, point, normal = self.cast(inward @ start, (turn @ direction).normalized())[:3]
         if not met:
             return None
