@@ -20,7 +20,8 @@ from .shapes import Key, key_of
 from .views import View, view_of
 
 MOST_FRAMES = 250
-"""Frames that are read, evenly spread over the range if there are more."""
+"""Frames that are read, evenly spread over the range if there are more, and cuts between cameras
+besides."""
 
 MOST_READ = 20_000
 """Places of things in all frames together."""
@@ -82,6 +83,8 @@ def _frames_after_first(scene: bpy.types.Scene, things: int) -> list[int]:
     first, last = scene.frame_start, scene.frame_end
     count = min(last - first + 1, MOST_FRAMES, max(2, MOST_READ // max(things, 1)))
     spread = {int(frame) for frame in np.linspace(first, last, count).round()}
+    cuts = {made.frame - before for made in scene.timeline_markers for before in (0, 1)}
+    spread |= {frame for frame in cuts if first <= frame <= last}
     return sorted((spread | {scene.frame_current}) - {first})
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..core.visible import NEAR
 from .frames import Reading, read_frames
-from .motion import cameras_of, moving
+from .motion import cameras_of, is_still, moving
 from .shapes import Crowd, Hit, Key, Shape, shapes_of
 from .steps import Steps
 from .views import View, view_of
@@ -150,9 +150,8 @@ def sight_of(
     shapes = shapes_of(graph)
     if shapes is None:
         return None
-    cameras = cameras_of(scene)
-    if not moved and len(cameras) == 1 and not cameras[0].data.animation_data:
-        view = view_of(scene, scene.camera)
+    if is_still(scene, moved):
+        view = view_of(scene, cameras_of(scene)[0])
         everything = tuple(shapes.values())
         return Sight((Moment(0, view, (Crowd(everything),), see_through),), (view,), everything)
     return _sight_in_motion(scene, shapes, moved, see_through)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from itertools import chain
 
 import bpy
 
@@ -33,22 +34,31 @@ def moving(
     scene: bpy.types.Scene, shown: Iterable[bpy.types.Object]
 ) -> frozenset[bpy.types.Object] | None:
     """Those objects that move: of what is shown and of the scene's cameras. None: single frames
-    would not tell how. Without anything that moves the scene stands still: empty."""
+    would not tell how."""
     shown, cameras = list(shown), cameras_of(scene)
-    if any(_appears(thing) for thing in scene.objects):
+    members = (
+        thing.instance_collection.all_objects for thing in shown if thing.instance_collection
+    )
+    if any(_appears(thing) for thing in {*scene.objects, *chain.from_iterable(members)}):
         return None
     if any(_is_reshaped(thing) for thing in shown):
         return None
     found = frozenset(thing for thing in {*shown, *cameras} if moves(thing))
-    if not found and len(cameras) == 1 and not any(_is_animated(c.data) for c in cameras):
+    if is_still(scene, found):
         return found
     return None if _is_untold(scene, shown, cameras, found) else found
 
 
+def is_still(scene: bpy.types.Scene, found: frozenset[bpy.types.Object]) -> bool:
+    """Whether all frames are the same. found: what moves."""
+    cameras = cameras_of(scene)
+    return not found and len(cameras) == 1 and not _is_animated(cameras[0].data)
+
+
 def cameras_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """All through which a scene is rendered, once each."""
-    marked = {made.camera: None for made in scene.timeline_markers if made.camera}
-    return list({scene.camera: None, **marked})
+    """All through which a scene may be rendered, once each."""
+    marked = (made.camera for made in scene.timeline_markers if made.camera)
+    return list(dict.fromkeys([scene.camera, *marked]))
 
 
 def moves(thing: bpy.types.Object) -> bool:

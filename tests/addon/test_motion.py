@@ -159,7 +159,9 @@ def test_whatever_moves_the_door(scene, moved_by):
     assert run_at_once(Reach.steps(found.sight)).escaped
 
 
-def test_a_camera_that_a_marker_chooses_sees_the_world(scene):
+@pytest.mark.parametrize("length", [100, 5000])
+def test_a_camera_that_a_marker_chooses_sees_the_world(scene, length):
+    scene.frame_end = length
     other = camera_towards(scene, np.array([1, 0, 0]), 40, 32)
     other.location = (5, 0, 0)
     scene.camera = next(c for c in scene.objects if c.type == "CAMERA" and c != other)
@@ -170,7 +172,9 @@ def test_a_camera_that_a_marker_chooses_sees_the_world(scene):
     assert found.camera_sees_world
     assert found.looked
     other.location = (0, 0, 0)
-    assert not needs(scene).camera_sees_world
+    found = needs(scene)
+    assert not found.camera_sees_world
+    assert found.sight
 
 
 def run_a_script(scene):

@@ -97,6 +97,38 @@ def test_the_same_hits_as_the_scenes_own_rays(scene, count, seed):
     assert met > 100
 
 
+def test_what_geometry_nodes_make_is_met(scene):
+    """Cubes that are no object's mesh, on the corners of a grid."""
+    tree = bpy.data.node_groups.new("Cubes", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    grid, cube, spread = (
+        tree.nodes.new(f"GeometryNode{kind}")
+        for kind in ("MeshGrid", "MeshCube", "InstanceOnPoints")
+    )
+    grid.inputs["Size X"].default_value = grid.inputs["Size Y"].default_value = 12
+    grid.inputs["Vertices X"].default_value = grid.inputs["Vertices Y"].default_value = 8
+    output = tree.nodes.new("NodeGroupOutput")
+    tree.links.new(grid.outputs["Mesh"], spread.inputs["Points"])
+    tree.links.new(cube.outputs["Mesh"], spread.inputs["Instance"])
+    tree.links.new(spread.outputs[0], output.inputs[0])
+    thing = bpy.data.objects.new("Thing", plate_mesh(1))
+    scene.collection.objects.link(thing)
+    thing.modifiers.new("Nodes", "NODES").node_group = tree
+    thing.rotation_euler = (0.3, 0.2, 0.1)
+    bpy.context.view_layer.update()
+    graph = bpy.context.evaluated_depsgraph_get()
+    shapes = shapes_of(graph)
+    assert len(shapes) == 64
+    crowd, met = Crowd(shapes.values()), 0
+    for start, along in rays(400, 1):
+        hit, point, *_ = scene.ray_cast(graph, start, along)
+        mine = crowd.nearest(start, along)
+        assert (mine is not None) == hit
+        met += hit
+        assert not hit or (mine.point - point).length < 1e-4 * max(1, mine.distance)
+    assert met > 50
+
+
 def test_a_normal_stands_upright_on_what_is_stretched(scene):
     """A plate that is turned and stretched unevenly (Blender 4.5's own rays lean here)."""
     plate = plate_mesh(1)
