@@ -21,7 +21,7 @@ from ..core.conversion import Conversion
 from ..core.sampling import MOST_IN_TREE, needs_light_tree
 from .lamps import FARTHEST, GUARDS, LEAST, lamp_data
 from .rig import GUARD, Rig
-from .scene_needs import SceneNeeds, shown_things
+from .scene_needs import SceneNeeds, users_things
 from .trace import TAG
 
 CORNERS = (1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)
@@ -105,7 +105,7 @@ def _guard(rig: Rig, to_light: Vector, strength: float) -> bpy.types.Object:
 
 def _other_suns(scene: bpy.types.Scene) -> int:
     """Sun lamps that are not a conversion's."""
-    return sum(1 for thing in shown_things(scene) if _is_sun(thing))
+    return sum(1 for thing in users_things(scene) if _is_sun(thing))
 
 
 def _is_sun(thing: bpy.types.Object) -> bool:

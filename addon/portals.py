@@ -54,11 +54,15 @@ class ClosedScene:
 
 
 def closed_scene(reach: Reach) -> Steps[ClosedScene | None]:
-    """The scene with its openings; None where it has none that explain all light in it."""
-    for _ in range(MOST_PATHS):
+    """The scene with its openings; None where it has none that explain all light in it, or where
+    more than the camera moves."""
+    if not reach.sight.stands_still:
+        return None
+    moments = reach.sight.moments
+    for path in range(MOST_PATHS):
         if len(reach.escaped) >= min(ENOUGH, WIDEST * LOOKS * max(len(reach.places), 1)):
             break
-        reach.follow_another()
+        reach.follow_another(moments[path % len(moments)])
         yield
     inside = _inside(reach)
     openings = find_openings(inside)
@@ -69,7 +73,7 @@ def _inside(reach: Reach) -> Inside:
     places = _points(place.point for place in reach.places)
     escaped, started = _points(reach.escaped), np.array(reach.started, dtype=np.intp)
     straight = [
-        reach.sight.is_open(reach.places[place].point, direction)
+        _is_open(reach, reach.places[place].point, direction)
         for place, direction in zip(reach.started, reach.escaped, strict=True)
     ]
     return Inside(
@@ -79,8 +83,12 @@ def _inside(reach: Reach) -> Inside:
         started[straight],
         _points(place.point for place in reach.met),
         _points(place.normal for place in reach.met),
-        lambda start, direction: reach.sight.is_open(Vector(start), Vector(direction)),
+        lambda start, direction: _is_open(reach, Vector(start), Vector(direction)),
     )
+
+
+def _is_open(reach: Reach, start: Vector, direction: Vector) -> bool:
+    return reach.sight.moments[0].is_open(start, direction)  # as in any, as nothing moves
 
 
 def _points(vectors: Sequence[Vector]) -> NDArray[np.float64]:
@@ -104,7 +112,7 @@ def _light_inside(
         strength = float(sun.irradiance @ LUMINANCE_WEIGHTS)
         facing[:, k] = strength * np.maximum(normals[chosen] @ direction, 0)
         for row in np.flatnonzero(facing[:, k]):
-            if reach.sight.is_open(reach.places[chosen[row]].point, Vector(direction)):
+            if _is_open(reach, reach.places[chosen[row]].point, Vector(direction)):
                 lit[row, k] = facing[row, k]
         yield
     return LightInside(

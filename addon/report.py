@@ -48,11 +48,20 @@ def made_sentences(conversion: Conversion) -> list[str]:
     return [*lines, *map_warnings(conversion), *conversion.notes]
 
 
+def looked_sentences(needs: SceneNeeds) -> list[str]:
+    """At which frames, where anything moves."""
+    if not needs.looked:
+        return []
+    count, first, last = needs.looked
+    text = said("Looked at {count} frames of {first} to {last} to see what may be skipped.")
+    return [text.format(count=count, first=first, last=last)]
+
+
 def skipped_sentences(
     conversion: Conversion, settings: ConversionSettings, needs: SceneNeeds, tree_off: bool
 ) -> list[str]:
     """What was left out, and why. settings: as the user has them."""
-    lines = []
+    lines = looked_sentences(needs)
     own, width = conversion.environment.own_width, conversion.settings.residual_width
     if conversion.invisible_part > LEAST_SAID:
         text = said(

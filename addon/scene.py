@@ -41,7 +41,7 @@ from .rays import Reach
 from .report import headline, made_sentences, portal_sentences, skipped_sentences
 from .restoring import restore_scene, swap_overrides
 from .rig import Rig, make_rig, rig_of
-from .scene_needs import ALL, SceneNeeds, needs_of
+from .scene_needs import ALL, SceneNeeds, needs_steps
 from .steps import Apart, Steps, run_at_once
 from .trace import TAG
 from .world import (
@@ -102,7 +102,7 @@ def conversion_steps(
     if options.two_passes:
         passes.check(scene)
     light = find_light(world, scene.render.engine)
-    found = needs_of(scene)
+    found = yield from needs_steps(scene)
     needs = found if options.skips else ALL
     environment = yield from read_image(light.image)
     needed = _without_excess(settings, environment.own_width, needs)

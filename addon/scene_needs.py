@@ -11,8 +11,11 @@ from dataclasses import dataclass, field
 import bpy
 
 from ..core.environment import whole_part, whole_part_from
-from .rays import Sight, camera_width, is_all_met, stands_still
+from .moments import Panes, Sight, sight_of
+from .ordinary import is_all_met, is_seen_as_rendered, shown_things
 from .rig import guards_of, rig_of
+from .steps import Steps, run_at_once
+from .views import finest_width, is_ordinary, view_of
 
 SHARP = 0.25
 """Roughness below which a surface may show single pixels of a wide map."""
@@ -34,7 +37,8 @@ class SceneNeeds:
     reflects or refracts sharply. other_lights: something but the world and lamps of conversions
     gives light. fog: something may scatter light on its way. camera_width: pixels around the sphere
     that a picture can tell apart; None: any. sight: the scene for rays that ask what light
-    reaches; None: they would not tell."""
+    reaches; None: they would not tell. looked: where anything moves, how many frames were looked
+    at, and the first and last of their range."""
 
     camera_sees_world: bool
     mirrors: bool
@@ -42,6 +46,7 @@ class SceneNeeds:
     fog: bool = False
     camera_width: int | None = None
     sight: Sight | None = field(default=None, compare=False)
+    looked: tuple[int, int, int] | None = None
 
     def width_for_camera(self, width: int) -> int:
         """Of the map that the camera sees, for a map of this width."""
@@ -56,35 +61,45 @@ class SceneNeeds:
         return whole_part_from(width, max(self.camera_width, LIGHTING_WIDTH))
 
 
-ALL = SceneNeeds(camera_sees_world=True, mirrors=True, other_lights=True, fog=True)
+ALL = SceneNeeds(camera_sees_world=True, mirrors=True, other_lights=True)
 """Nothing is skipped."""
 
 
 def needs_of(scene: bpy.types.Scene) -> SceneNeeds:
-    """Look at a scene: its camera, lamps, materials and shapes."""
-    shown = shown_things(scene)
+    """Look at a scene, all at once: see `needs_steps`."""
+    return run_at_once(needs_steps(scene))
+
+
+def needs_steps(scene: bpy.types.Scene) -> Steps[SceneNeeds]:
+    """Look at a scene: its camera, lamps, materials and shapes; in several frames where they
+    move."""
+    shown = users_things(scene)
     trees = _trees(scene, shown)
     nodes = [node for tree in trees for node in _nodes(tree)]
     if any(tree.animation_data for tree in trees) or any(node.type == "SCRIPT" for node in nodes):
         return ALL
-    sight = _sight(scene, shown)
+    sight = None
+    if is_seen_as_rendered(scene, shown):
+        sight = sight_of(scene, shown, _panes(shown))
+    sees_world = yield from _sees_world(scene, nodes, sight)
     return SceneNeeds(
-        camera_sees_world=_sees_world(scene, nodes, sight),
+        camera_sees_world=sees_world,
         mirrors=any(_is_sharp(node) for node in nodes),
         other_lights=any(thing.type == "LIGHT" for thing in shown)
         or any(_shines(node) for node in nodes),
         fog=_is_foggy(scene, nodes),
-        camera_width=camera_width(scene),
-        sight=sight if sight and _is_told_by_rays(scene, shown, nodes) else None,
+        camera_width=_camera_width(scene, sight),
+        sight=sight if sight and _is_told_by_rays(scene, shown, nodes, sight) else None,
+        looked=(len(sight.moments), *sight.frames) if sight and sight.frames else None,
     )
 
 
-def shown_things(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """What renders may show and no conversion has made."""
+def users_things(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """What renders may show and no conversion has made, once each."""
     state = scene.sunsplit
     own = {entry.lamp for entry in state.lamps} | {*rig_of(state.sky), *guards_of(state.sky)}
     own |= set(state.portals.objects) if state.portals else set()
-    return list(_shown(thing for thing in scene.objects if thing not in own))
+    return list(dict.fromkeys(shown_things(t for t in scene.objects if t not in own)))
 
 
 def _is_foggy(scene: bpy.types.Scene, nodes: Iterable[bpy.types.Node]) -> bool:
@@ -94,30 +109,36 @@ def _is_foggy(scene: bpy.types.Scene, nodes: Iterable[bpy.types.Node]) -> bool:
     return any(n.type in kinds and n.inputs["Volume"].is_linked for n in outputs)
 
 
-def _sight(scene: bpy.types.Scene, shown: list[bpy.types.Object]) -> Sight | None:
-    """The scene for rays, where they tell what renders will show."""
-    if not stands_still(scene, shown):
+def _camera_width(scene: bpy.types.Scene, sight: Sight | None) -> int | None:
+    if sight:
+        return finest_width(scene, sight.views)
+    camera = scene.camera
+    if not is_ordinary(camera) or scene.render.use_multiview:
         return None
-    graph = bpy.context.evaluated_depsgraph_get()
-    if graph.scene != scene:
+    if any(marker.camera for marker in scene.timeline_markers):
         return None
-    clear = [thing for thing in shown if _lets_light_through(thing)]
-    straight = [thing for thing in clear if _is_shadowless(thing)]
-    return Sight(scene, graph, _names(clear), _names(straight))
-
-
-def _names(things: list[bpy.types.Object]) -> frozenset[str]:
-    return frozenset(thing.name for thing in things)
+    if scene.animation_data or camera.data.animation_data:
+        return None
+    return finest_width(scene, [view_of(scene, camera)])
 
 
 def _is_told_by_rays(
-    scene: bpy.types.Scene, shown: list[bpy.types.Object], nodes: list[bpy.types.Node]
+    scene: bpy.types.Scene,
+    shown: list[bpy.types.Object],
+    nodes: list[bpy.types.Node],
+    sight: Sight,
 ) -> bool:
     """Whether rays meet all that light would meet: no fog, and nothing that only renders show."""
     if any(layer.material_override for layer in scene.view_layers):
         return False
     foggy = any(n.type == "OUTPUT_MATERIAL" and n.inputs["Volume"].is_linked for n in nodes)
-    return not foggy and is_all_met(scene, shown)
+    return not foggy and is_all_met(scene, shown, sight.shapes)
+
+
+def _panes(shown: Iterable[bpy.types.Object]) -> Panes:
+    panes = [thing for thing in shown if _lets_light_through(thing)]
+    straight = [thing for thing in panes if _is_shadowless(thing)]
+    return Panes(*(frozenset(thing.name for thing in those) for those in (panes, straight)))
 
 
 def _lets_light_through(thing: bpy.types.Object) -> bool:
@@ -140,15 +161,6 @@ def _is_translucent(node: bpy.types.Node) -> bool:
         inside = ("Transmission Weight", "Subsurface Weight")
         return _is_seen_through(node) or any(_is_above(node, name, 0) for name in inside)
     return _is_seen_through(node) or node.type in TRANSLUCENT
-
-
-def _shown(things: Iterable[bpy.types.Object]) -> Iterator[bpy.types.Object]:
-    """Things that renders may show, and those in collections that they are instances of."""
-    for thing in things:
-        if not thing.hide_render:
-            yield thing
-            if thing.instance_collection:
-                yield from _shown(thing.instance_collection.all_objects)
 
 
 def _trees(scene: bpy.types.Scene, shown: list[bpy.types.Object]) -> list[bpy.types.NodeTree]:
@@ -207,10 +219,12 @@ def _is_seen_through(node: bpy.types.Node) -> bool:
     return node.type in ("BSDF_TRANSPARENT", "BSDF_RAY_PORTAL", "HOLDOUT")
 
 
-def _sees_world(scene: bpy.types.Scene, nodes: list[bpy.types.Node], sight: Sight | None) -> bool:
+def _sees_world(
+    scene: bpy.types.Scene, nodes: list[bpy.types.Node], sight: Sight | None
+) -> Steps[bool]:
     """Whether a camera ray may reach the world."""
     if scene.render.film_transparent:
         return False
     if sight is None or any(_is_seen_through(node) for node in nodes):
         return True
-    return sight.camera_sees_world()
+    return (yield from sight.camera_sees_world())

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from sunsplit.addon.rays import Reach, camera_width
+from sunsplit.addon.rays import Reach
 from sunsplit.addon.scene_needs import needs_of
 from sunsplit.addon.steps import run_at_once
 from tests.blender import (
@@ -115,11 +115,26 @@ def not_be_rendered(scene):
 
 
 def move(scene):
-    ground(scene).keyframe_insert("location", frame=1)
+    """The ground turns over, so that it shows its other side."""
+    for frame, angle in ((1, 0.0), (40, np.pi)):
+        ground(scene).rotation_euler[0] = angle
+        ground(scene).keyframe_insert("rotation_euler", frame=frame)
 
 
 def move_camera(scene):
-    scene.camera.keyframe_insert("location", frame=1)
+    """From above the ground to where it sees a plate below it."""
+    add_mesh(scene, plate_mesh(1), diffuse("Plate", 0.5), Matrix.Translation((3, 0, -6)))
+    for frame, height in ((1, 3), (250, -3)):
+        scene.camera.location[2] = height
+        scene.camera.keyframe_insert("location", frame=frame)
+
+
+def wave(scene):
+    ground(scene).modifiers.new("Wave", "WAVE")
+
+
+def appear(scene):
+    ground(scene).keyframe_insert("hide_render", frame=1)
 
 
 def hide_from_the_viewport_only(scene):
@@ -133,11 +148,10 @@ def fill_with_smoke(scene):
 
 
 def be_everywhere(scene):
-    empty = bpy.data.objects.new("Instance", None)
-    made = bpy.data.collections.new("Things")
-    made.objects.link(bpy.data.objects.new("Thing", plate_mesh(1)))
-    empty.instance_type, empty.instance_collection = "COLLECTION", made
-    scene.collection.objects.link(empty)
+    """On each corner of the ground."""
+    thing = bpy.data.objects.new("Thing", plate_mesh(1))
+    scene.collection.objects.link(thing)
+    thing.parent, ground(scene).instance_type = ground(scene), "VERTS"
 
 
 @pytest.mark.parametrize(
@@ -148,6 +162,8 @@ def be_everywhere(scene):
         not_be_rendered,
         move,
         move_camera,
+        wave,
+        appear,
         hide_from_the_viewport_only,
         fill_with_smoke,
         be_everywhere,
@@ -193,16 +209,30 @@ def test_the_width_that_a_camera_shows(scene):
     """64 pixels across 40 degrees, at its corners finer than in the middle."""
     half = np.tan(np.radians(20))
     finest = 2 * half / 64 / (1 + 2 * half**2)
-    assert camera_width(scene) == pytest.approx(2 * 2 * np.pi / finest, abs=1)
+    assert needs_of(scene).camera_width == pytest.approx(2 * 2 * np.pi / finest, abs=1)
     scene.render.resolution_percentage = 50
-    assert camera_width(scene) == pytest.approx(2 * np.pi / finest, abs=1)
+    assert needs_of(scene).camera_width == pytest.approx(2 * np.pi / finest, abs=1)
     scene.camera.data.type = "ORTHO"
-    assert camera_width(scene) is None
+    assert needs_of(scene).camera_width is None
 
 
-def test_a_lens_that_changes_may_show_any_width(scene):
-    scene.camera.data.keyframe_insert("lens", frame=1)
-    assert camera_width(scene) is None
+def test_a_lens_that_changes_shows_what_its_longest_shows(scene):
+    still = needs_of(scene).camera_width
+    lens = scene.camera.data.lens
+    for frame, times in ((1, 1), (60, 2)):
+        scene.camera.data.lens = times * lens
+        scene.camera.data.keyframe_insert("lens", frame=frame)
+    scene.camera.data.lens = lens
+    longest = needs_of(scene).camera_width
+    assert 1.5 * still < longest
+    scene.camera.data.lens = 2 * lens
+    scene.camera.data.animation_data_clear()
+    assert longest == needs_of(scene).camera_width
+
+
+def test_a_lens_that_a_script_changes_may_show_any_width(scene):
+    scene.camera.data.driver_add("lens").driver.expression = "sum([20, frame])"
+    assert needs_of(scene).camera_width is None
 
 
 @pytest.mark.parametrize("mirrors", [False, True])
@@ -216,7 +246,7 @@ def test_a_camera_gets_no_wider_a_map_than_it_can_show(two_suns, tmp_path, mirro
     if mirrors:
         chrome = material("Chrome", (1, 1, 1), Metallic=1, Roughness=0)
         add_mesh(made, plate_mesh(1), chrome, Matrix())
-    assert 1024 < camera_width(made) <= 2048
+    assert 1024 < needs_of(made).camera_width <= 2048
     bpy.ops.sunsplit.convert()
     nodes = made.world.node_tree.nodes
     assert nodes["Sunsplit: Camera"].image.size[0] == 2048

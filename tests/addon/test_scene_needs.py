@@ -64,7 +64,9 @@ def move_camera_out(scene):
 
 
 def animate_camera(scene):
-    scene.camera.keyframe_insert("location", frame=1)
+    for frame, place in ((1, 0), (250, 9)):
+        scene.camera.location[0] = place
+        scene.camera.keyframe_insert("location", frame=frame)
 
 
 def make_glass_pane(scene):

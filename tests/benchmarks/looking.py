@@ -2,7 +2,8 @@
 
     .venv-5.2/bin/python -m tests.benchmarks.looking MAP [-o FOLDER] [--width 4096] ...
 
-Looking at a scene of many triangles, and of many objects; at a scene where nothing can be skipped,
+Looking at a scene of many triangles, of many objects, and of a forest of many instances, each also
+while its camera turns; at a scene where nothing can be skipped,
 as a part of converting and rendering it, interleaved with and without; and converting again with
 another number of lights, another share, and with the world turned. Medians.
 """
@@ -35,7 +36,15 @@ from sunsplit.core.settings import ConversionSettings
 from sunsplit.core.visible import visible_part
 from tests.benchmarks.equal_error import enlarged
 from tests.benchmarks.scenes import SCENES
-from tests.blender import add_mapping, add_mesh, diffuse, material, plate_mesh, timed_render
+from tests.blender import (
+    add_mapping,
+    add_mesh,
+    ball_mesh,
+    diffuse,
+    material,
+    plate_mesh,
+    timed_render,
+)
 
 
 @dataclass(frozen=True)
@@ -51,18 +60,34 @@ def seconds(work: Callable[[], object]) -> float:
 
 
 def looks(path: Path, options: argparse.Namespace) -> list[Result]:
-    """The first look, which has to sort the triangles, and the next."""
+    """The first look, which has to sort the triangles, the next, and one at several frames."""
     found = []
     for what, build, size in (
         (f"{2 * options.side**2:,} triangles", _with_hills, options.side),
-        (f"{options.objects} objects", _with_objects, options.objects),
+        (f"{options.objects:,} objects", _with_objects, options.objects),
+        (f"{options.instances:,} instances", _with_forest, options.instances),
     ):
         scene = build(path, size)
         bpy.context.view_layer.update()
         found.append(Result(f"look at {what}, first", seconds(partial(_reach, scene))))
         again = [seconds(partial(_reach, scene)) for _ in range(options.repeats)]
         found.append(Result(f"look at {what}, again", float(np.median(again))))
+        _turn_camera(scene)
+        turned = [seconds(partial(_reach, scene)) for _ in range(options.repeats)]
+        count = needs_of(scene).looked[0]
+        label = f"look at {what}, {count} frames of a turning camera"
+        found.append(Result(label, float(np.median(turned))))
     return found
+
+
+def _turn_camera(scene: bpy.types.Scene) -> None:
+    """By 90 degrees in 250 frames."""
+    camera = scene.camera
+    camera.rotation_mode = "XYZ"
+    for frame, turn in ((1, 0), (250, np.pi / 2)):
+        camera.rotation_euler[2] += turn
+        camera.keyframe_insert("rotation_euler", frame=frame)
+    scene.frame_set(1)
 
 
 def _reach(scene: bpy.types.Scene) -> Reach:
@@ -89,6 +114,22 @@ def _with_objects(path: Path, count: int) -> bpy.types.Scene:
     for number in range(count - len(scene.objects)):
         place = Matrix.Translation((number % rows - rows / 2, number // rows - rows / 2, 0.01))
         add_mesh(scene, plate_mesh(0.2), stone, place)
+    return scene
+
+
+def _with_forest(path: Path, count: int) -> bpy.types.Scene:
+    """Instances of a collection with a ball in it."""
+    scene = SCENES["outdoor"](path, 96)
+    trees = bpy.data.collections.new("Trees")
+    tree = bpy.data.objects.new("Tree", ball_mesh(0.4))
+    tree.data.materials.append(diffuse("Leaf", 0.5))
+    trees.objects.link(tree)
+    half = 0.6 * np.sqrt(count)
+    for x, y in np.random.default_rng(0).uniform(-half, half, (count, 2)):
+        place = bpy.data.objects.new("Place", None)
+        place.instance_type, place.instance_collection = "COLLECTION", trees
+        place.location = (x, y, 0.4)
+        scene.collection.objects.link(place)
     return scene
 
 
@@ -160,7 +201,8 @@ def main(arguments: Sequence[str] | None = None) -> list[Result]:
     parser.add_argument("-o", "--output", type=Path, default=Path("out"))
     parser.add_argument("--width", type=int, default=4096, help="of the map that is changed")
     parser.add_argument("--side", type=int, default=707, help="squares along the hills")
-    parser.add_argument("--objects", type=int, default=400)
+    parser.add_argument("--objects", type=int, default=5000)
+    parser.add_argument("--instances", type=int, default=20_000)
     parser.add_argument("--size", type=int, default=96)
     parser.add_argument("--samples", type=int, default=16)
     parser.add_argument("--repeats", type=int, default=5)

@@ -52,6 +52,7 @@ def test_region_a(tmp_path, monkeypatch, sunrise):
 
 def test_looking(tmp_path, sunrise):
     few = ["--width", "0", "--side", "20", "--objects", "30", "--size", "48", "--samples", "1"]
+    few += ["--instances", "40"]
     results = looking.main([str(sunrise), *few, "--repeats", "1", "-o", str(tmp_path)])
     assert all(one.seconds > 0 for one in results)
     lines = (tmp_path / "looking.md").read_text().splitlines()

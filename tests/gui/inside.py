@@ -138,6 +138,35 @@ def new_scene() -> None:
     open_scene("scene.blend")
 
 
+def animate() -> None:
+    """A camera that pans over a ground, at frame 30 of 100; it was moved since, without a key."""
+    scene = bpy.context.scene
+    scene.frame_end = 100
+    bpy.ops.mesh.primitive_plane_add(size=200)
+    camera = bpy.data.objects.new("Pan", bpy.data.cameras.new("Pan"))
+    scene.collection.objects.link(camera)
+    scene.camera, camera.rotation_euler[0] = camera, 1.0
+    for frame, turn in ((1, 0.0), (100, 1.0)):
+        camera.rotation_euler[2], camera.location[2] = turn, 3
+        camera.keyframe_insert("rotation_euler", frame=frame)
+        camera.keyframe_insert("location", frame=frame)
+    scene.frame_set(30)
+    camera.location[0] = 0.25
+    remember_step("Animate")
+
+
+def animated() -> list[object]:
+    """The frame, where the camera stands, and all scenes of the file."""
+    scene = bpy.context.scene
+    return [scene.frame_current, *scene.camera.matrix_world.translation, len(bpy.data.scenes)]
+
+
+def look() -> tuple[int, int, int] | None:
+    """How many frames Sunsplit looks at, of which range."""
+    module = importlib.import_module("bl_ext.user_default.sunsplit.addon.scene_needs")
+    return module.needs_of(bpy.context.scene).looked
+
+
 def light_by(name: str) -> None:
     """Give the scene's world a map that lies in the folder."""
     tree = bpy.context.scene.world.node_tree

@@ -91,6 +91,26 @@ def test_click_converts_the_world(window: Window, before: dict, converted: dict,
     assert headline in window.ask("reports()")
 
 
+def test_in_motion_other_frames_are_looked_at_and_the_window_stays_at_its_own(
+    window: Window, quiet: None
+):
+    window.ask("animate()")
+    window.settle()
+    before = window.ask("animated()")
+    assert before == [30, 0.25, 0, 3, 1]
+    assert window.ask("look()")[1:] == [1, 100]
+    window.settle()
+    assert window.ask("animated()") == before
+    window.press("sunsplit.convert")
+    window.wait_for(CONVERTED)
+    assert "frames of 1 to 100" in window.ask("state()")["report"]
+    window.settle()
+    assert window.ask("animated()")[::4] == [30, 1]
+    window.key("ctrl+z")
+    window.wait_for(RESTORED)
+    assert window.ask("animated()")[::4] == [30, 1]
+
+
 def test_one_undo_takes_it_back_and_redo_brings_it(
     window: Window, before: dict, converted: dict, quiet: None
 ):
