@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
 
 from ..core.conversion import Conversion
-from ..core.environment import LUMINANCE_WEIGHTS, EnvironmentMap
+from ..core.environment import LUMINANCE_WEIGHTS
 from ..core.errors import UnusableInput
-from ..core.openings import Opening
 from ..core.outlines import outlines_of
 from ..core.passes import parts_of, samples_of_passes
-from ..core.portal_noise import openings_pay
 from ..core.progress import Progress, silent
-from ..core.sampling import BY_PORTALS, WorldSampling, choose_sampling
 from ..core.settings import ConversionSettings
-from ..core.visible import VisiblePart, through_openings, visible_part
 from . import eevee, passes
 from .controls import keep_factors
 from .driven import followed
+from .fitted import MADE, Fitted, fitted_conversion
 from .images import (
-    READ,
     Radiance,
     folder_for_maps,
     packed_image,
@@ -31,13 +27,11 @@ from .images import (
     remove_images,
     write_map,
 )
-from .known import known_conversion
 from .lamps import collection_of, make_lamps, name_lamps
 from .light_groups import put_into_groups
 from .light_tree import make_guards, tree_plan
 from .options import SceneOptions
-from .portals import ClosedScene, closed_scene, has_portals, make_portals
-from .rays import Reach
+from .portals import make_portals
 from .report import headline, made_sentences, portal_sentences, skipped_sentences
 from .restoring import restore_scene, swap_overrides
 from .rig import Rig, make_rig, rig_of
@@ -51,18 +45,6 @@ from .world import (
     is_animated,
     name_images,
 )
-
-MADE = 0.9
-"""Of the time of a conversion, about, until its maps are written."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Made:
-    """What a scene is to get. images: of the maps that its world shows, by what they are."""
-
-    conversion: Conversion
-    images: Mapping[str, bpy.types.Image]
-    openings: tuple[Opening, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,22 +88,13 @@ def conversion_steps(
     needs = found if options.skips else ALL
     environment = yield from read_image(light.image)
     needed = _without_excess(settings, environment.own_width, needs)
-    reach = yield from _reach(scene, needs)
-    visible = yield from _what_is_visible(reach, environment, needed, light)
-    conversion, openings = yield from _converted(
-        lambda part: Apart(
-            lambda listen, _: known_conversion(environment, needed, part, listen), READ, MADE
-        ),
-        visible,
-        (yield from _closed(scene, reach, needed)),
-        light,
-    )
+    fitted = yield from fitted_conversion(scene, environment, needed, needs, light)
+    conversion = fitted.conversion
     with folder_for_maps() as folder:
         paths = yield Apart(lambda *_: _write_maps(folder, conversion, needs), MADE, 1)
         outlines = yield Apart(lambda *_: outlines_of(conversion).to_text(), 1, 1)
         images = {path.stem: packed_image(path) for path in paths}
-    made = _Made(conversion, images, openings)
-    result = _replace(scene, light, made, settings, options, found)
+    result = _replace(scene, light, fitted, images, settings, options, found)
     scene.sunsplit.outlines = outlines
     return result
 
@@ -144,67 +117,6 @@ def _is_converted(scene: bpy.types.Scene) -> bool:
     return scene.world == state.converted_world and state.original_world is not None
 
 
-def _reach(scene: bpy.types.Scene, needs: SceneNeeds) -> Steps[Reach | None]:
-    """What light can reach; None where rays do not tell. EEVEE's world shines through everything:
-    there, what is left in it would do harm."""
-    if needs.sight is None or scene.render.engine != "CYCLES":
-        return None
-    return (yield from Reach.steps(needs.sight))
-
-
-def _what_is_visible(
-    reach: Reach | None,
-    environment: EnvironmentMap,
-    settings: ConversionSettings,
-    light: WorldLight,
-) -> Steps[VisiblePart | None]:
-    # Where the world is animated, what is hidden now may come round.
-    if reach is None or not settings.chooses_border or is_animated(light, ()):
-        return None
-    to_map = light.map_from_world
-    return (
-        yield Apart(
-            lambda _, in_main: visible_part(environment, reach.looks(to_map, in_main)), READ, READ
-        )
-    )
-
-
-def _closed(
-    scene: bpy.types.Scene, reach: Reach | None, settings: ConversionSettings
-) -> Steps[ClosedScene | None]:
-    """The scene's openings where portals may help; None where the user has made some."""
-    if reach is None or not settings.leaves_residual or has_portals(scene):
-        return None
-    return (yield from closed_scene(reach))
-
-
-def _converted(
-    convert: Callable[[VisiblePart | None], Apart],
-    visible: VisiblePart | None,
-    closed: ClosedScene | None,
-    light: WorldLight,
-) -> Steps[tuple[Conversion, tuple[Opening, ...]]]:
-    """A conversion, and the openings that it is made for: that for Cycles with portals in them or
-    without, which ever is predicted to be less noisy."""
-    if closed is None:
-        return (yield convert(visible)), ()
-    to_map = light.map_from_world
-    told = yield convert(through_openings(visible, closed.part))
-    light_told = yield from closed.light(told, to_map)
-    untold = yield convert(visible)
-    light_untold = yield from closed.light(untold, to_map)
-    if openings_pay(light_told, light_untold, _sampling(untold).method != "NONE"):
-        return told, closed.openings
-    return untold, ()
-
-
-def _sampling(conversion: Conversion) -> WorldSampling:
-    has_cells = conversion.settings.residual == "voronoi"
-    return choose_sampling(
-        conversion.residual, conversion.visible_share, has_cells, conversion.visible
-    )
-
-
 def _write_maps(folder: Path, conversion: Conversion, needs: SceneNeeds) -> list[Path]:
     """Files of what the converted world shows instead of the map, named by what it is."""
     maps: dict[str, Radiance] = {}
@@ -221,7 +133,8 @@ def _write_maps(folder: Path, conversion: Conversion, needs: SceneNeeds) -> list
 def _replace(
     scene: bpy.types.Scene,
     light: WorldLight,
-    made: _Made,
+    fitted: Fitted,
+    images: Mapping[str, bpy.types.Image],
     settings: ConversionSettings,
     options: SceneOptions,
     found: SceneNeeds,
@@ -231,15 +144,13 @@ def _replace(
     state, world = scene.sunsplit, scene.world
     needs = found if options.skips else ALL
     original = state.original_world if _is_converted(scene) else world
-    conversion, openings = made.conversion, made.openings
+    conversion, openings = fitted.conversion, fitted.openings
     tree = tree_plan(scene, conversion, needs, found, bool(openings))
-    has_cells = conversion.settings.residual == "voronoi"
-    sampling = BY_PORTALS if openings else _sampling(conversion)
     sees_it = needs.camera_sees_world
     try:
-        new = converted_world(world, light, made.images, sampling, has_cells, sees_it)
+        new = converted_world(world, light, images, fitted.sampling, fitted.has_cells, sees_it)
     finally:
-        remove_images(made.images)
+        remove_images(images)
     light = find_light(new, scene.render.engine)  # the same, in the new world
     rig = make_rig(light.texture)
     keep_factors(state.sky, rig.sky)

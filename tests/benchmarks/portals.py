@@ -19,7 +19,8 @@ from unittest import mock
 import bpy
 import numpy as np
 
-from sunsplit.addon import scene as conversions
+from sunsplit.addon import fitted
+from sunsplit.addon.scene import convert_scene
 from sunsplit.core.portal_noise import (
     LightInside,
     mean_square_told,
@@ -84,8 +85,8 @@ def _convert(made: bpy.types.Scene, portals: bool, seen: list) -> int:
         seen.append(asked)
         return portals
 
-    with mock.patch.object(conversions, "openings_pay", choose):
-        return len(conversions.convert_scene(made, ConversionSettings()).conversion.suns)
+    with mock.patch.object(fitted, "openings_pay", choose):
+        return len(convert_scene(made, ConversionSettings()).conversion.suns)
 
 
 def _save(folder: Path, way: str) -> None:

@@ -1,0 +1,109 @@
+"""Convert a map for what a scene shows of it: for the light that reaches something, and for the
+openings that it comes in through."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+
+from ..core.conversion import Conversion
+from ..core.environment import EnvironmentMap
+from ..core.openings import Opening
+from ..core.portal_noise import openings_pay
+from ..core.sampling import BY_PORTALS, WorldSampling, choose_sampling
+from ..core.settings import ConversionSettings
+from ..core.visible import VisiblePart, through_openings, visible_part
+from .images import READ
+from .known import known_conversion
+from .portals import ClosedScene, closed_scene, has_portals
+from .rays import Reach
+from .scene_needs import SceneNeeds
+from .steps import Apart, Steps
+from .world import WorldLight, is_animated
+
+MADE = 0.9
+"""Of the time of a conversion, about, until its maps are written."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A conversion, and the openings that portals are to stand in for it."""
+
+    conversion: Conversion
+    openings: tuple[Opening, ...] = ()
+
+    @property
+    def has_cells(self) -> bool:
+        """Whether the residual is a Voronoi map."""
+        return self.conversion.settings.residual == "voronoi"
+
+    @property
+    def sampling(self) -> WorldSampling:
+        """How Cycles looks for the residual."""
+        if self.openings:
+            return BY_PORTALS
+        of = self.conversion
+        return choose_sampling(of.residual, of.visible_share, self.has_cells, of.visible)
+
+
+def fitted_conversion(
+    scene: bpy.types.Scene,
+    environment: EnvironmentMap,
+    settings: ConversionSettings,
+    needs: SceneNeeds,
+    light: WorldLight,
+) -> Steps[Fitted]:
+    """Convert the map that lights a scene; in a closed one for Cycles with portals or without,
+    whichever is predicted to be less noisy."""
+
+    def convert(part: VisiblePart | None) -> Apart:
+        return Apart(
+            lambda listen, _: known_conversion(environment, settings, part, listen), READ, MADE
+        )
+
+    reach = yield from _reach(scene, needs)
+    visible = yield from _what_is_visible(reach, environment, settings, light)
+    closed = yield from _closed(scene, reach, settings)
+    if closed is None:
+        return Fitted((yield convert(visible)))
+    told = Fitted((yield convert(through_openings(visible, closed.part))), closed.openings)
+    untold = Fitted((yield convert(visible)))
+    inside = []
+    for each in (told, untold):
+        inside.append((yield from closed.light(each.conversion, light.map_from_world)))
+    return told if openings_pay(*inside, untold.sampling.method != "NONE") else untold
+
+
+def _reach(scene: bpy.types.Scene, needs: SceneNeeds) -> Steps[Reach | None]:
+    """What light can reach; None where rays do not tell. EEVEE's world shines through everything:
+    there, what is left in it would do harm."""
+    if needs.sight is None or scene.render.engine != "CYCLES":
+        return None
+    return (yield from Reach.steps(needs.sight))
+
+
+def _what_is_visible(
+    reach: Reach | None,
+    environment: EnvironmentMap,
+    settings: ConversionSettings,
+    light: WorldLight,
+) -> Steps[VisiblePart | None]:
+    # Where the world is animated, what is hidden now may come round.
+    if reach is None or not settings.chooses_border or is_animated(light, ()):
+        return None
+    to_map = light.map_from_world
+    return (
+        yield Apart(
+            lambda _, in_main: visible_part(environment, reach.looks(to_map, in_main)), READ, READ
+        )
+    )
+
+
+def _closed(
+    scene: bpy.types.Scene, reach: Reach | None, settings: ConversionSettings
+) -> Steps[ClosedScene | None]:
+    """The scene's openings where portals may help; None where the user has made some."""
+    if reach is None or not settings.leaves_residual or has_portals(scene):
+        return None
+    return (yield from closed_scene(reach))
