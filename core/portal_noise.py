@@ -13,11 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .sampling import TIME_BY_TREE
+
 Floats = NDArray[np.float64]
 
 COST = 1.3
-"""Of a sample that looks for suns and through openings, against one that only looks for suns; this
-and the next by docs/benchmarks/portals.md."""
+"""Of a sample that looks for suns and through openings, against one that only looks for as many
+suns; this and the next by docs/benchmarks/portals.md."""
 
 THROUGH = 2.0
 """Mean square, in squares of the mean, of the sky's light found through openings: places near them
@@ -46,8 +48,13 @@ def openings_pay(told: LightInside, untold: LightInside, has_table: bool) -> boo
     """Whether a conversion for a path tracer that knows the openings, `told`, is less noisy for its
     time than one for a path tracer that does not. has_table: the latter looks for the sky in all
     directions anyway, by its importance map."""
-    cost = 1.0 if has_table else COST
+    cost = (1.0 if has_table else COST) * _time(told) / _time(untold)
     return cost * mean_square_told(told) < mean_square_untold(untold, has_table)
+
+
+def _time(light: LightInside) -> float:
+    """Of a sample, against one without suns to choose among; of many the brightest are known."""
+    return 1 + TIME_BY_TREE * light.suns.shape[1]
 
 
 def mean_square_untold(light: LightInside, has_table: bool) -> float:
