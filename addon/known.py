@@ -7,8 +7,8 @@ else: an image that was changed or loaded again is never taken for what it was.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,9 @@ MOST_BYTES = 2**28
 """Of pixels in memory: a map of more, 8k and up, is not kept. Of a file only what it was narrowed
 to is held anyway."""
 
+CONVERSIONS = 2
+"""Of a map are kept: of a scene with openings two are asked for in turn."""
+
 _BLOCK = 2**16
 """Numbers that are summed into one by a fingerprint."""
 
@@ -32,12 +35,11 @@ _WEIGHTS = np.random.default_rng(0).integers(2**64, size=_BLOCK, dtype=np.uint64
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """conversion: the last one of this map; made for these settings and this visible part."""
+    """made: the last conversions of this map, by the settings and visible part they are for."""
 
     fingerprint: str
     environment: EnvironmentMap
-    made_for: object = None
-    conversion: Conversion | None = None
+    made: Mapping[object, Conversion] = field(default_factory=dict)
 
 
 _last: list[_Known] = []
@@ -73,17 +75,16 @@ def known_conversion(
     visible: VisiblePart | None,
     progress: Progress = silent,
 ) -> Conversion:
-    """A conversion of a map, the last one if it is the same."""
+    """A conversion of a map, one of the last if it is the same."""
     made_for = settings, visible.key if visible else None
-    for known in _last:
-        if known.environment is environment and known.made_for == made_for and known.conversion:
-            return known.conversion
+    known = next((one for one in _last if one.environment is environment), None)
+    if known and made_for in known.made:
+        return known.made[made_for]
     conversion = convert(environment, settings, progress, visible)
-    _last[:] = [
-        _Known(known.fingerprint, environment, made_for, conversion)
-        for known in _last
-        if known.environment is environment
-    ]
+    if known:
+        made = {**known.made, made_for: conversion}
+        last = dict(list(made.items())[-CONVERSIONS:])
+        _last[:] = [_Known(known.fingerprint, environment, last)]
     return conversion
 
 

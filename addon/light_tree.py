@@ -48,16 +48,16 @@ def tree_plan(
     conversion: Conversion,
     needs: SceneNeeds,
     found: SceneNeeds,
-    has_portals: bool,
+    by_portals: bool,
 ) -> TreePlan:
     """What to do with a scene's light tree. needs: what may not be skipped. found: the same as the
-    scene has it, whether or not anything shall be skipped. has_portals: the world is a light to
+    scene has it, whether or not anything shall be skipped. by_portals: the world is a light to
     choose, too, and not like the lamps."""
     if not hasattr(scene, "cycles"):
         return TreePlan()
     if not scene.cycles.use_light_tree and not scene.sunsplit.light_tree_off:
         return TreePlan()  # as the user has it
-    others = needs.other_lights or has_portals
+    others = needs.other_lights or by_portals
     if not others and not needs_light_tree(conversion.suns, conversion.strata.light):
         return TreePlan(is_idle=True)
     if not conversion.suns or not overflows(len(conversion.suns) + _other_suns(scene)):

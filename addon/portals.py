@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
@@ -16,8 +17,10 @@ from ..core.environment import LUMINANCE_WEIGHTS, luminance
 from ..core.openings import WIDEST, Inside, Opening, find_openings, part_seen
 from ..core.portal_noise import LightInside
 from ..core.sums import weighted_sum
+from .images import READ
+from .lamps import remove_lamps, unlink_lamps
 from .rays import LOOKS, Reach
-from .steps import Steps
+from .steps import Apart, Steps
 from .trace import TAG
 
 COLLECTION = "Sunsplit Portals"
@@ -27,6 +30,12 @@ ENOUGH = 100
 
 MOST_PATHS = 1_000
 """Followed for them: if fewer get out the openings are cracks."""
+
+MOST_PLACES = 3_000
+"""That are asked, where more were found."""
+
+AT_A_TIME = 16
+"""Rays between two moments for the window."""
 
 MOST_SUNS = 16
 """The brightest, asked for at each place."""
@@ -64,34 +73,48 @@ def closed_scene(reach: Reach) -> Steps[ClosedScene | None]:
             break
         reach.follow_another(moments[path % len(moments)])
         yield
-    inside = _inside(reach)
-    openings = find_openings(inside)
+    inside, openings = yield Apart(lambda _, in_main: _openings(reach, in_main), READ, READ)
     return ClosedScene(reach, inside, openings) if openings else None
 
 
-def _inside(reach: Reach) -> Inside:
-    places = _points(place.point for place in reach.places)
-    escaped, started = _points(reach.escaped), np.array(reach.started, dtype=np.intp)
-    straight = [
-        _is_open(reach, reach.places[place].point, direction)
-        for place, direction in zip(reach.started, reach.escaped, strict=True)
-    ]
-    return Inside(
-        places,
+def _openings(reach: Reach, run: Callable[[Steps], Any]) -> tuple[Inside, tuple[Opening, ...]]:
+    """run: runs steps where rays may be cast, and returns their result."""
+
+    def are_open(starts: NDArray[np.float64], directions: NDArray[np.float64]) -> Any:  # noqa: ANN401
+        rays = [(Vector(a), Vector(b)) for a, b in zip(starts, directions, strict=True)]
+        return run(_are_open(reach, rays))
+
+    known = len(reach.places[:MOST_PLACES])
+    rays = [ray for ray in zip(reach.started, reach.escaped, strict=True) if ray[0] < known]
+    started = np.array([place for place, _ in rays], dtype=np.intp)
+    straight = run(_are_open(reach, [(reach.places[k].point, away) for k, away in rays]))
+    inside = Inside(
+        _points(place.point for place in reach.places[:known]),
         LOOKS,
-        escaped[straight],
+        _points(away for _, away in rays)[straight],
         started[straight],
         _points(place.point for place in reach.met),
         _points(place.normal for place in reach.met),
-        lambda start, direction: _is_open(reach, Vector(start), Vector(direction)),
+        are_open,
     )
+    return inside, find_openings(inside)
+
+
+def _are_open(reach: Reach, rays: Sequence[tuple[Vector, Vector]]) -> Steps[NDArray[np.bool_]]:
+    """From which directions light comes straight."""
+    found = np.zeros(len(rays), bool)
+    for k, (start, direction) in enumerate(rays):
+        found[k] = _is_open(reach, start, direction)
+        if k % AT_A_TIME == 0:
+            yield
+    return found
 
 
 def _is_open(reach: Reach, start: Vector, direction: Vector) -> bool:
     return reach.sight.moments[0].is_open(start, direction)  # as in any, as nothing moves
 
 
-def _points(vectors: Sequence[Vector]) -> NDArray[np.float64]:
+def _points(vectors: Iterable[Vector]) -> NDArray[np.float64]:
     return np.array([tuple(one) for one in vectors], dtype=np.float64).reshape(-1, 3)
 
 
@@ -102,7 +125,7 @@ def _light_inside(
     height, width = radiance.shape[:2]
     lum = luminance(radiance)
     solid = sphere.row_solid_angles(width, height)
-    normals = _points(place.normal for place in reach.places)
+    normals = _points(place.normal for place in reach.places[: len(inside.places)])
     chosen = np.linspace(0, len(normals), min(SUNLIT, len(normals)), endpoint=False).astype(int)
     suns = sorted(conversion.suns, key=lambda sun: -float(sun.irradiance @ LUMINANCE_WEIGHTS))
     facing = np.zeros((len(chosen), min(len(suns), MOST_SUNS)))
@@ -114,7 +137,8 @@ def _light_inside(
         for row in np.flatnonzero(facing[:, k]):
             if _is_open(reach, reach.places[chosen[row]].point, Vector(direction)):
                 lit[row, k] = facing[row, k]
-        yield
+            if row % AT_A_TIME == 0:
+                yield
     return LightInside(
         lum.ravel()[sphere.pixels_at(inside.escaped @ to_map.T, width, height)],
         (normals[inside.started] * inside.escaped).sum(axis=1),
@@ -131,48 +155,42 @@ def has_portals(scene: bpy.types.Scene) -> bool:
     return any(data.type == "AREA" and data.cycles.is_portal for data in lamps)
 
 
-def make_portals(
-    scene: bpy.types.Scene, openings: Sequence[Opening]
-) -> bpy.types.Collection | None:
-    """A portal in each opening, in a new collection of the scene; None without any."""
+def make_portals(scene: bpy.types.Scene, openings: Sequence[Opening]) -> None:
+    """A portal in each opening, in a new collection of the scene."""
     if not openings:
-        return None
-    collection = bpy.data.collections.new(COLLECTION)
-    collection[TAG] = True
+        return
+    state = scene.sunsplit
+    state.portals_collection = bpy.data.collections.new(COLLECTION)
+    state.portals_collection[TAG] = True
     for number, opening in enumerate(openings, start=1):
-        data = bpy.data.lights.new(f"Sunsplit Portal {number}", "AREA")
-        data[TAG] = True
-        data.shape, data.size, data.size_y = "RECTANGLE", opening.width, opening.height
-        data.cycles.is_portal = True
-        data.energy = 0.0  # to other engines it is a lamp
-        data.use_shadow = False
-        portal = bpy.data.objects.new(data.name, data)
-        portal[TAG] = True
-        # A lamp shines along its -Z.
-        turn = np.stack([opening.across, np.cross(-opening.inwards, opening.across)], axis=1)
-        axes = np.column_stack([turn, -opening.inwards])
-        portal.matrix_world = Matrix.Translation(opening.centre) @ Matrix(axes.tolist()).to_4x4()
-        collection.objects.link(portal)
-    scene.collection.children.link(collection)
-    return collection
+        portal = _portal(opening, f"Sunsplit Portal {number}")
+        state.portals_collection.objects.link(portal)
+        state.portals.add().lamp = portal
+    scene.collection.children.link(state.portals_collection)
 
 
-def remove_portals(scene: bpy.types.Scene, collection: bpy.types.Collection | None) -> None:
-    """Take a conversion's portals out of a scene; what another scene still uses stays there."""
-    if collection is None or collection.library is not None:
-        return
-    if collection.name in scene.collection.children:
-        scene.collection.children.unlink(collection)
-    if collection.users:
-        return
-    portals = [thing for thing in collection.objects if thing.get(TAG)]
-    for thing in collection.objects:
-        if thing not in portals and thing.name not in scene.collection.objects:
-            scene.collection.objects.link(thing)  # the user has put it there
-    bpy.data.collections.remove(collection)
-    for portal in portals:
-        data = portal.data
-        if portal.users == 0:
-            bpy.data.objects.remove(portal)
-            if data.users == 0:
-                bpy.data.lights.remove(data)
+def _portal(opening: Opening, name: str) -> bpy.types.Object:
+    data = bpy.data.lights.new(name, "AREA")
+    data[TAG] = True
+    data.shape, data.size, data.size_y = "RECTANGLE", opening.width, opening.height
+    data.cycles.is_portal = True
+    data.energy = 0.0  # to other engines it is a lamp
+    data.use_shadow = False
+    portal = bpy.data.objects.new(name, data)
+    portal[TAG] = True
+    # A lamp shines along its -Z.
+    out = -opening.inwards
+    axes = np.column_stack([opening.across, np.cross(out, opening.across), out])
+    portal.matrix_world = Matrix.Translation(opening.centre) @ Matrix(axes.tolist()).to_4x4()
+    return portal
+
+
+def remove_portals(scene: bpy.types.Scene) -> None:
+    """Take a conversion's portals out of a scene, wherever the user has put them; what another
+    scene still uses stays there."""
+    state = scene.sunsplit
+    portals = [entry.lamp for entry in state.portals if entry.lamp]
+    collection, state.portals_collection = state.portals_collection, None
+    state.portals.clear()
+    unlink_lamps(scene, collection, portals)
+    remove_lamps(portals)

@@ -333,7 +333,8 @@ class SunsplitSettings(bpy.types.PropertyGroup):
             type=bpy.types.Collection, name="Suns", description="What holds the lamps"
         ),
         "lamps": CollectionProperty(type=SunsplitLamp),
-        "portals": PointerProperty(
+        "portals": CollectionProperty(type=SunsplitLamp),
+        "portals_collection": PointerProperty(
             type=bpy.types.Collection, name="Portals", description="What shows Cycles the openings"
         ),
         "sky": PointerProperty(

@@ -32,9 +32,9 @@ def restore_scene(scene: bpy.types.Scene) -> None:
     passes.remove_suns_layer(scene)
     eevee.take_back(scene)
     remove_groups(scene.view_layers)
-    sky, portals, guards = state.sky, state.portals, guards_of(state.sky)
+    sky, guards = state.sky, guards_of(state.sky)
     _forget(state)
-    remove_portals(scene, portals)
+    remove_portals(scene)
     if state.light_tree_off and hasattr(scene, "cycles"):
         scene.cycles.use_light_tree = True
     state.light_tree_off = False
@@ -54,7 +54,6 @@ def restore_scene(scene: bpy.types.Scene) -> None:
 def _forget(state: bpy.types.PropertyGroup) -> None:
     """What a scene knows of its conversion."""
     state.original_world = state.converted_world = state.collection = state.sky = None
-    state.portals = None
     state.lamps.clear()
     state.report = state.outlines = ""
 

@@ -84,7 +84,7 @@ def conversion_steps(
     if options.two_passes:
         passes.check(scene)
     light = find_light(world, scene.render.engine)
-    found = yield from needs_steps(scene)
+    found = yield from needs_steps(scene, look=options.skips)
     needs = found if options.skips else ALL
     environment = yield from read_image(light.image)
     needed = _without_excess(settings, environment.own_width, needs)
@@ -169,7 +169,7 @@ def _replace(
     restore_scene(scene)
     name_images(new, conversion.environment.name)
     result = _install(scene, original, conversion, new, rig, lamps, guards)
-    state.portals = make_portals(scene, openings)
+    make_portals(scene, openings)
     if tree.off:
         scene.cycles.use_light_tree, state.light_tree_off = False, True
     if for_eevee:

@@ -6,7 +6,7 @@ Whatever cannot be told is needed.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import bpy
 
@@ -70,14 +70,19 @@ def needs_of(scene: bpy.types.Scene) -> SceneNeeds:
     return run_at_once(needs_steps(scene))
 
 
-def needs_steps(scene: bpy.types.Scene) -> Steps[SceneNeeds]:
+def needs_steps(scene: bpy.types.Scene, look: bool = True) -> Steps[SceneNeeds]:
     """Look at a scene: its camera, lamps, materials and shapes; in several frames where they
-    move."""
+    move. look: else only what gives or scatters light is told, and all else needed."""
     shown = users_things(scene)
     trees = _trees(scene, shown)
     nodes = [node for tree in trees for node in _nodes(tree)]
-    if any(tree.animation_data for tree in trees) or any(node.type == "SCRIPT" for node in nodes):
-        return ALL
+    lights = any(thing.type == "LIGHT" for thing in shown) or any(_shines(node) for node in nodes)
+    fog = _is_foggy(scene, nodes)
+    changes = any(tree.animation_data for tree in trees)
+    if changes or any(node.type == "SCRIPT" for node in nodes):
+        return replace(ALL, fog=fog)
+    if not look:
+        return replace(ALL, other_lights=lights, fog=fog)
     sight = None
     if is_seen_as_rendered(scene, shown):
         sight = sight_of(scene, shown, _panes(shown))
@@ -85,9 +90,8 @@ def needs_steps(scene: bpy.types.Scene) -> Steps[SceneNeeds]:
     return SceneNeeds(
         camera_sees_world=sees_world,
         mirrors=any(_is_sharp(node) for node in nodes),
-        other_lights=any(thing.type == "LIGHT" for thing in shown)
-        or any(_shines(node) for node in nodes),
-        fog=_is_foggy(scene, nodes),
+        other_lights=lights,
+        fog=fog,
         camera_width=_camera_width(scene, sight),
         sight=sight if sight and _is_told_by_rays(scene, shown, nodes, sight) else None,
         looked=(len(sight.moments), *sight.frames) if sight and sight.frames else None,
@@ -98,7 +102,7 @@ def users_things(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """What renders may show and no conversion has made, once each."""
     state = scene.sunsplit
     own = {entry.lamp for entry in state.lamps} | {*rig_of(state.sky), *guards_of(state.sky)}
-    own |= set(state.portals.objects) if state.portals else set()
+    own |= {entry.lamp for entry in state.portals}
     return list(dict.fromkeys(shown_things(t for t in scene.objects if t not in own)))
 
 

@@ -25,8 +25,8 @@ MOST = 8
 FEWEST = 12
 """Rays that get out, from which on openings can be told."""
 
-MOST_RAYS = 300
-"""Of them are looked at: more say little more."""
+MOST_RAYS, MOST_SURFACES = 300, 3000
+"""Of them, and of surfaces that the others met, are looked at: more say little more."""
 
 FEWEST_EACH, EACH = 3, 0.04
 """Of them through each opening, and as a part of all: less is a crack."""
@@ -73,8 +73,8 @@ class Inside:
 
     places: where they started, (p, 3), each as many, `looks`. escaped: directions of those that got
     out straight, (n, 3), and started: the place of each, (n,). points, normals: of surfaces that
-    the others met, (m, 3), normals to the ray's side. is_open: whether one gets out from a place,
-    (3,), in a direction, (3,).
+    the others met, (m, 3), normals to the ray's side. are_open: which of rays, starts and
+    directions (k, 3), get out, (k,).
     """
 
     places: Floats
@@ -83,11 +83,13 @@ class Inside:
     started: NDArray[np.intp]
     points: Floats
     normals: Floats
-    is_open: Callable[[Floats, Floats], bool]
+    are_open: Callable[[Floats, Floats], NDArray[np.bool_]]
 
-    def thinned(self, count: int) -> Inside:
-        """The same with places that have about so many rays that get out, if there are more."""
+    def thinned(self, count: int, surfaces: int) -> Inside:
+        """The same with places that have about so many rays that get out, if there are more, and
+        so many surfaces that were met."""
         every = -(-len(self.escaped) // count)
+        every_met = max(-(-len(self.points) // surfaces), 1)
         chosen = np.arange(0, len(self.places), every)
         of_chosen = self.started % every == 0
         return replace(
@@ -95,6 +97,8 @@ class Inside:
             places=self.places[chosen],
             escaped=self.escaped[of_chosen],
             started=self.started[of_chosen] // every,
+            points=self.points[::every_met],
+            normals=self.normals[::every_met],
         )
 
 
@@ -137,7 +141,9 @@ def find_openings(inside: Inside) -> tuple[Opening, ...]:
     # At most all looks of the places outside get out, and few of those inside.
     if not FEWEST <= count <= looks * (1 - INSIDE + INSIDE * WIDEST):
         return ()
-    inside = inside.thinned(MOST_RAYS)
+    if len(inside.points) < FEWEST:  # nothing stops light
+        return ()
+    inside = inside.thinned(MOST_RAYS, MOST_SURFACES)
     starts = inside.places[inside.started]
     planes, axes = _planes(inside)
     left = np.ones(len(starts), bool)
@@ -322,5 +328,4 @@ def _targets(inside: Inside, rough: Opening, random: np.random.Generator) -> Flo
     starts = inside.places[random.choice(before, TARGETS)]
     away = targets - starts
     away /= np.linalg.norm(away, axis=1)[:, None]
-    rays = zip(starts, away, strict=True)
-    return targets[np.array([inside.is_open(*ray) for ray in rays])]
+    return targets[inside.are_open(starts, away)]

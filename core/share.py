@@ -84,7 +84,9 @@ def choose_strata(
     if not settings.shadowed_residual:
         return _truest(environment, settings)
     part = visible.key if visible else None
-    seen = environment.latest("seen", part, lambda: Seen(environment, visible))
+    # Scenes with openings ask for both in turn.
+    name = "seen through openings" if visible and visible.through else "seen"
+    seen = environment.latest(name, part, lambda: Seen(environment, visible))
     if settings.lights is not None:
         return _calmest(seen, settings)
     return seen.strata(seen.borders.best_level, settings.strata)

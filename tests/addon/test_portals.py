@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
+from sunsplit.addon import known
 from tests.addon.test_convert import inventory
 from tests.blender import (
     add_mesh,
+    ball_mesh,
     camera_towards,
     diffuse,
     fresh_scene,
@@ -86,14 +88,52 @@ def test_it_goes_after_saving_and_opening_again(scene, tmp_path):
 def test_what_the_user_has_put_beside_it_stays(scene):
     bpy.ops.sunsplit.convert()
     mine = bpy.data.objects.new("Mine", None)
-    scene.sunsplit.portals.objects.link(mine)
+    scene.sunsplit.portals_collection.objects.link(mine)
     bpy.ops.sunsplit.restore()
     assert mine.name in scene.collection.objects
 
 
+def test_wherever_the_user_has_put_it_it_goes(scene):
+    bpy.ops.sunsplit.convert()
+    mine = bpy.data.collections.new("Mine")
+    scene.collection.children.link(mine)
+    (portal,) = portals(scene)
+    scene.sunsplit.portals_collection.objects.unlink(portal)
+    mine.objects.link(portal)
+    bpy.ops.sunsplit.restore()
+    assert not portals(scene)
+    bpy.ops.sunsplit.convert()
+    made = scene.sunsplit.portals_collection
+    scene.collection.children.unlink(made)
+    mine.children.link(made)
+    bpy.ops.sunsplit.convert()
+    assert len(portals(scene)) == 1
+    bpy.ops.sunsplit.restore()
+    assert not portals(scene)
+
+
+def test_a_second_time_nothing_is_converted(scene, monkeypatch):
+    bpy.ops.sunsplit.convert()
+    report = scene.sunsplit.report
+    monkeypatch.setattr(known, "convert", None)
+    bpy.ops.sunsplit.convert()
+    assert scene.sunsplit.report == report
+
+
+def test_a_glass_ball_alone_before_the_map_is_no_room(overcast):
+    scene = fresh_scene()
+    hdri_world(scene, overcast)
+    ball = material("Glass", (1, 1, 1), Roughness=0.0, Transmission_Weight=1)
+    add_mesh(scene, ball_mesh(1), ball, Matrix())
+    camera_towards(scene, np.array([1, 0, 0]), 40, 32).location = (-4, 0, 0)
+    bpy.context.view_layer.update()
+    bpy.ops.sunsplit.convert()
+    assert not portals(scene)
+
+
 def test_one_of_two_scenes_that_share_it_keeps_it(scene):
     bpy.ops.sunsplit.convert()
-    made = scene.sunsplit.portals
+    made = scene.sunsplit.portals_collection
     other = bpy.data.scenes.new("Other")
     other.collection.children.link(made)
     bpy.ops.sunsplit.restore()
@@ -104,6 +144,7 @@ def test_one_of_two_scenes_that_share_it_keeps_it(scene):
 def test_portals_are_no_suns_and_hide_nothing(scene):
     bpy.ops.sunsplit.convert(lights=4)
     lamps = len(suns(scene))
+    assert portals(scene)
     assert all(entry.lamp.data.type == "SUN" for entry in scene.sunsplit.lamps)
     bpy.ops.sunsplit.convert(lights=4)
     assert len(suns(scene)) == lamps

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -73,9 +73,8 @@ def look_around(holes, turn=None, count=1500, seed=0):
     directions = directions.reshape(-1, 3)
     points, facing, out = meet(holes, starts, directions)
 
-    def is_open(start, direction):
-        ray = turn.inv().apply([start, direction])
-        return bool(meet(holes, ray[:1], ray[1:])[2][0])
+    def are_open(starts, directions):
+        return meet(holes, turn.inv().apply(starts), turn.inv().apply(directions))[2]
 
     return Inside(
         turn.apply(places + 1e-6 * normals),
@@ -84,7 +83,7 @@ def look_around(holes, turn=None, count=1500, seed=0):
         np.flatnonzero(out) // LOOKS,
         turn.apply(points[~out]),
         turn.apply(facing[~out]),
-        is_open,
+        are_open,
     )
 
 
@@ -166,6 +165,24 @@ def test_a_closed_scene_and_one_with_a_crack_have_none():
     assert find_openings(look_around([Hole(0, True, (2.0, 1.0), (2.001, 2.0))])) == ()
 
 
+def test_where_nothing_stops_light_there_are_none():
+    """A glass ball before the map: half of the looks get out straight, the others are bent."""
+    inside = look_around([WINDOW])
+    nothing = np.empty((0, 3))
+    assert find_openings(replace(inside, points=nothing, normals=nothing)) == ()
+
+
+def test_uneven_walls_cost_no_more_than_even_ones():
+    """Many surfaces of as many directions: a few of them are looked at."""
+    inside = look_around([WINDOW])
+    normals = np.random.default_rng(3).normal(size=(100_000, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    points = np.random.default_rng(4).random((100_000, 3)) * SIZE
+    seen = inside.thinned(300, 3000)
+    assert len(replace(inside, points=points, normals=normals).thinned(300, 3000).points) <= 3000
+    assert len(seen.places) == len(inside.places)
+
+
 def test_a_garden_before_the_window_does_not_count():
     """What is outside is lit by all of the sky and explained by no opening."""
     inside = look_around([WINDOW], count=2000)
@@ -183,7 +200,7 @@ def test_a_garden_before_the_window_does_not_count():
         np.concatenate([inside.started, 2000 + np.arange(1500) // LOOKS]),
         inside.points,
         inside.normals,
-        inside.is_open,
+        inside.are_open,
     )
     (found,) = find_openings(more)
     covered, size = covers(found, WINDOW)
