@@ -30,7 +30,17 @@ def room(path: Path, size: int = 32, turn: float = 0.0) -> bpy.types.Scene:
     scene = fresh_scene()
     hdri_world(scene, path)
     around = Matrix.Rotation(turn, 4, "Z")
-    walls = diffuse("Wall", 0.7)
+    build_walls(scene, diffuse("Wall", 0.7), around)
+    towards = around.to_3x3() @ MOVE((-1, 0.4, -0.4)).translation
+    camera = camera_towards(scene, np.array(towards), 70, size)
+    camera.location = around @ MOVE((1.6, -1.2, 1.5)).translation
+    scene.cycles.max_bounces = 4
+    bpy.context.view_layer.update()
+    return scene
+
+
+def build_walls(scene: bpy.types.Scene, walls: bpy.types.Material, turn: Matrix) -> None:
+    """Floor, ceiling and four walls, one of them with the window."""
     # Half sides x, y, z and where each box stands: floor, ceiling, back, sides, front in four.
     for half, place in (
         ((2.2, 2.2, 0.1), (0, 0, -0.2)),
@@ -43,14 +53,7 @@ def room(path: Path, size: int = 32, turn: float = 0.0) -> bpy.types.Scene:
         ((0.1, 0.8, 0.5), (2.1, 0, -0.1)),
         ((0.1, 0.8, 0.25), (2.1, 0, 2.1)),
     ):
-        add_mesh(scene, box_mesh(*half), walls, around @ MOVE(place))
-    camera = camera_towards(
-        scene, np.array(around.to_3x3() @ MOVE((-1, 0.4, -0.4)).translation), 70, size
-    )
-    camera.location = around @ MOVE((1.6, -1.2, 1.5)).translation
-    scene.cycles.max_bounces = 4
-    bpy.context.view_layer.update()
-    return scene
+        add_mesh(scene, box_mesh(*half), walls, turn @ MOVE(place))
 
 
 def close_with(scene: bpy.types.Scene, pane: bpy.types.Material) -> bpy.types.Object:

@@ -24,6 +24,7 @@ from tests.blender import (
     material,
     plate_mesh,
 )
+from tests.rooms import build_walls
 
 MOVE = Matrix.Translation
 
@@ -59,20 +60,7 @@ def product(path: Path, size: int) -> bpy.types.Scene:
 def room(path: Path, size: int) -> bpy.types.Scene:
     """A closed white room with one window towards the key light; the camera sees no sky."""
     scene, turn = _under(path)
-    walls = diffuse("Wall", 0.75)
-    # Half sides x, y, z and where each box stands: floor, ceiling, back, sides, front in four.
-    for half, place in (
-        ((2.2, 2.2, 0.1), (0, 0, -0.2)),
-        ((2.2, 2.2, 0.1), (0, 0, 2.6)),
-        ((0.1, 2.2, 1.4), (-2.1, 0, -0.1)),
-        ((2.2, 0.1, 1.4), (0, 2.1, -0.1)),
-        ((2.2, 0.1, 1.4), (0, -2.1, -0.1)),
-        ((0.1, 0.7, 1.4), (2.1, 1.4, -0.1)),
-        ((0.1, 0.7, 1.4), (2.1, -1.4, -0.1)),
-        ((0.1, 0.8, 0.5), (2.1, 0, -0.1)),
-        ((0.1, 0.8, 0.25), (2.1, 0, 2.1)),
-    ):
-        add_mesh(scene, box_mesh(*half), walls, turn @ MOVE(place))
+    build_walls(scene, diffuse("Wall", 0.75), turn)
     add_mesh(scene, box_mesh(0.3, 0.3, 0.35), diffuse("Box", 0.6), turn @ MOVE((-0.3, 0.6, 0)))
     add_mesh(scene, ball_mesh(0.4), diffuse("Ball", 0.6), turn @ MOVE((0.2, -0.6, 0.4)))
     _camera(scene, turn, (1.6, -1.6, 1.6), 70, size, aim=(-0.8, 0.6, 0.7))
