@@ -102,12 +102,12 @@ def _work(graph: bpy.types.Depsgraph) -> float:
 
 def _frames_after_first(scene: bpy.types.Scene, things: int, work: float) -> list[int]:
     first, last = scene.frame_start, scene.frame_end
-    affordable = min(MOST_READ // max(things, 1), int(MOST_WORK // work))
+    others = {made.frame - before for made in cuts_of(scene) for before in (0, 1)}
+    others = {frame for frame in (*others, scene.frame_current) if first <= frame <= last}
+    affordable = min(MOST_READ // max(things, 1), int(MOST_WORK // work) - len(others))
     count = min(last - first + 1, MOST_FRAMES, max(2, affordable))
     spread = {int(frame) for frame in np.linspace(first, last, count).round()}
-    others = {made.frame - before for made in cuts_of(scene) for before in (0, 1)}
-    others.add(scene.frame_current)
-    return sorted((spread | {frame for frame in others if first <= frame <= last}) - {first})
+    return sorted((spread | others) - {first})
 
 
 def _camera_at(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
