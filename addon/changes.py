@@ -22,7 +22,7 @@ NODES_THAT_STAND_STILL = re.compile(
     r"(ShaderNode|FunctionNode|NodeReroute$|NodeFrame$|NodeGroup(Input|Output)$|GeometryNode"
     r"(?!ApplySimulated|Bake|BoneInfo|CameraInfo|Collection|CustomGroup|DeformCurves|Image|Import"
     r"|InputActiveCamera|InputCollection|InputImage|InputObject|InputSceneTime|IsViewport"
-    r"|ObjectInfo|ReplaceMaterial|Sample(Sound|Grid)|SelfObject|SetMaterial$|Simulation|Tool"
+    r"|ObjectInfo|ReplaceMaterial|SampleSound|SelfObject|SetMaterial$|Simulation|Tool"
     r"|ViewportTransform|XPBD))"
 )
 """Nodes of geometry that make the same in all frames, in a viewport as in renders, of nothing but

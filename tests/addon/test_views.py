@@ -35,7 +35,8 @@ def test_rays_go_through_the_picture(scene, size):
     for across, down in ((0, 0), (0.2, 0.7), (1, 0.5)):
         start, direction = view.ray(across, down)
         assert direction.length == pytest.approx(1, abs=1e-6)
-        x, y, _ = world_to_camera_view(scene, camera, start + 5 * direction)
+        x, y, depth = world_to_camera_view(scene, camera, start + 5 * direction)
+        assert depth > 0
         assert (x, y) == pytest.approx((across, 1 - down), abs=1e-5)
 
 
