@@ -7,7 +7,6 @@ before the next step, so neither the window nor undo ever see it.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,8 +15,10 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from .changes import SHAPE, changes_of
+from .motion import cuts_of
 from .shapes import Key, key_of
-from .views import View, view_of
+from .views import View, is_ordinary, view_of
 
 MOST_FRAMES = 250
 """Frames that are read, evenly spread over the range if there are more, and cuts between cameras
@@ -26,8 +27,14 @@ besides."""
 MOST_READ = 20_000
 """Places of things in all frames together."""
 
-PATIENCE = 1.0
-"""Seconds for all frames: what takes longer to evaluate is not told."""
+MOST_THINGS = 4_000
+"""More take longer than about a second to be evaluated for the first time."""
+
+MOST_WORK = 60_000
+"""In all frames together, in things that move: each takes about ten microseconds a frame."""
+
+BONE, POINT = 0.3, 0.03
+"""What a bone, and a point of a mesh that is bent anew in each frame, take of that."""
 
 HANDLERS = (
     "frame_change_pre",
@@ -51,52 +58,67 @@ def read_frames(
     cameras: Iterable[bpy.types.Object],
     moving: Iterable[bpy.types.Object],
 ) -> list[Reading] | None:
-    """Frames of a scene's range, first and last among them, and the one that it shows; None: that
-    takes too long."""
+    """Frames of a scene's range, first and last among them, and the one that it shows if it is of
+    the range; None: that is too much work, or the camera does not stay an ordinary one."""
+    things = {*cameras, *moving}
+    if len(things) > MOST_THINGS:
+        return None
     found: list[Reading] = []
-    until = time.perf_counter() + PATIENCE
-    with _scratch(scene, {*cameras, *moving}) as (scratch, graph):
+    with _scratch(scene, things) as (scratch, graph):
         frames = [scene.frame_start]
         while frames:
             frame = frames.pop(0)
             scratch.frame_current = frame
             graph.update()
-            found.append(_read(scene, frame, graph))
-            if len(found) == 1:
-                frames = _frames_after_first(scene, len(found[0].places))
-            if time.perf_counter() > until:
+            camera = _camera_at(scene, frame).evaluated_get(graph)
+            if not is_ordinary(camera):
                 return None
+            found.append(Reading(frame, view_of(scene, camera), _places(graph)))
+            if len(found) == 1:
+                work = _work(graph) + len(found[0].places)
+                frames = _frames_after_first(scene, len(found[0].places), work)
+                if (1 + len(frames)) * work > MOST_WORK:
+                    return None
     return sorted(found, key=lambda reading: reading.frame)
 
 
-def _read(scene: bpy.types.Scene, frame: int, graph: bpy.types.Depsgraph) -> Reading:
-    places = {
+def _places(graph: bpy.types.Depsgraph) -> dict[Key, Matrix]:
+    return {
         key_of(entry): entry.matrix_world.copy()
         for entry in graph.object_instances
         if entry.object.type == "MESH" and (entry.is_instance or entry.show_self)
     }
-    camera = _camera_at(scene, frame).evaluated_get(graph)
-    return Reading(frame, view_of(scene, camera), places)
 
 
-def _frames_after_first(scene: bpy.types.Scene, things: int) -> list[int]:
+def _work(graph: bpy.types.Depsgraph) -> float:
+    """To evaluate another frame, in things that move; by what it is about, as the same scene must
+    be told the same on any machine."""
+    things = [one for one in graph.ids if isinstance(one, bpy.types.Object)]
+    changed = changes_of(thing.original for thing in things)
+    bones = sum(len(thing.pose.bones) for thing in things if thing.pose)
+    bent = [t for t in things if t.type == "MESH" and (t.original, SHAPE) in changed]
+    return len(things) + BONE * bones + POINT * sum(len(thing.data.vertices) for thing in bent)
+
+
+def _frames_after_first(scene: bpy.types.Scene, things: int, work: float) -> list[int]:
     first, last = scene.frame_start, scene.frame_end
-    count = min(last - first + 1, MOST_FRAMES, max(2, MOST_READ // max(things, 1)))
+    others = {made.frame - before for made in cuts_of(scene) for before in (0, 1)}
+    others = {frame for frame in (*others, scene.frame_current) if first <= frame <= last}
+    affordable = min(MOST_READ // max(things, 1), int(MOST_WORK // work) - len(others))
+    count = min(last - first + 1, MOST_FRAMES, max(2, affordable))
     spread = {int(frame) for frame in np.linspace(first, last, count).round()}
-    cuts = {made.frame - before for made in scene.timeline_markers for before in (0, 1)}
-    spread |= {frame for frame in cuts if first <= frame <= last}
-    return sorted((spread | {scene.frame_current}) - {first})
+    return sorted((spread | others) - {first})
 
 
 def _camera_at(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
     """The last one that a marker has chosen by then; before the first marker that one's."""
-    marked = [made for made in scene.timeline_markers if made.camera]
-    if not marked:
+    cuts = cuts_of(scene)
+    if not cuts:
         return scene.camera
-    past = [made for made in marked if made.frame <= frame]
+    past = [made for made in cuts if made.frame <= frame]
     if past:
         return max(past, key=lambda made: made.frame).camera
-    return min(marked, key=lambda made: made.frame).camera
+    return min(cuts, key=lambda made: made.frame).camera
 
 
 @contextmanager

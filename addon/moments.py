@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..core.visible import NEAR
 from .frames import Reading, read_frames
 from .motion import cameras_of, is_still, moving
-from .shapes import Crowd, Hit, Key, Shape, WholeScene, shapes_of, whole_scene
+from .shapes import Crowd, Hit, Key, Shape, WholeScene, are_flattened, shapes_of, whole_scene
 from .steps import Steps
 from .views import View, view_of
 
@@ -202,6 +202,8 @@ def _sight_in_motion(
         Moment(number, readings[k].view, (still, choice.crowd(k)), panes)
         for number, k in enumerate(chosen)
     )
+    if are_flattened(shape for moment in moments for shape in moment.crowds[1].shapes):
+        return None
     views = tuple(reading.view for reading in readings)
     frames = scene.frame_start, scene.frame_end
     return Sight(moments, views, tuple(shapes.values()), frames)

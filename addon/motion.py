@@ -7,16 +7,12 @@ its shape, is simulated, appears or vanishes, or runs a script, is not.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from itertools import chain
 
 import bpy
 
-DEFORMING = {
-    *("ARMATURE", "BUILD", "CLOTH", "DYNAMIC_PAINT", "EXPLODE", "FLUID", "MESH_CACHE"),
-    *("MESH_SEQUENCE_CACHE", "NODES", "OCEAN", "PARTICLE_SYSTEM", "SOFT_BODY", "WAVE"),
-}
-"""Modifiers that may move a surface without a key on it."""
+from .changes import PLACE, SHAPE, SHAPELESS, animated_paths, changes_of, is_animated
 
 FROM_ELSEWHERE = {"CAMERA_SOLVER", "FOLLOW_TRACK", "OBJECT_SOLVER"}
 """Constraints that ask for more of a scene than its objects."""
@@ -41,9 +37,10 @@ def moving(
     )
     if any(_appears(thing) for thing in {*scene.objects, *chain.from_iterable(members)}):
         return None
-    if any(_is_reshaped(thing) for thing in shown):
+    changed = changes_of({*shown, *cameras})
+    if any((thing, SHAPE) in changed for thing in shown if thing.type not in SHAPELESS):
         return None
-    found = frozenset(thing for thing in {*shown, *cameras} if moves(thing))
+    found = frozenset(thing for thing in {*shown, *cameras} if (thing, PLACE) in changed)
     if is_still(scene, found):
         return found
     return None if _is_untold(scene, shown, cameras, found) else found
@@ -52,57 +49,23 @@ def moving(
 def is_still(scene: bpy.types.Scene, found: frozenset[bpy.types.Object]) -> bool:
     """Whether all frames are the same. found: what moves."""
     cameras = cameras_of(scene)
-    return not found and len(cameras) == 1 and not _is_animated(cameras[0].data)
+    return not found and len(cameras) == 1 and not is_animated(cameras[0].data)
 
 
 def cameras_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """All through which a scene may be rendered, once each."""
-    marked = (made.camera for made in scene.timeline_markers if made.camera)
-    return list(dict.fromkeys([scene.camera, *marked]))
+    return list(dict.fromkeys([scene.camera, *(made.camera for made in cuts_of(scene))]))
 
 
-def moves(thing: bpy.types.Object) -> bool:
-    """Whether an object may be elsewhere in another frame."""
-    if _is_animated(thing) or thing.constraints or thing.rigid_body:
-        return True
-    return bool(thing.parent and (moves(thing.parent) or _is_reshaped(thing.parent)))
-
-
-def _is_animated(thing: bpy.types.ID | None) -> bool:
-    made = getattr(thing, "animation_data", None)
-    return bool(made and (made.action or len(made.drivers) or len(made.nla_tracks)))
-
-
-def _is_reshaped(thing: bpy.types.Object) -> bool:
-    """Whether its surface may change in itself, or be made anew for each frame."""
-    if any(part.type in DEFORMING for part in thing.modifiers) or len(thing.particle_systems):
-        return True
-    keys = getattr(thing.data, "shape_keys", None)
-    if _is_animated(keys) or (thing.type == "MESH" and _is_animated(thing.data)):
-        return True
-    # A mirror that moves, or moving past one that does not: either makes another shape.
-    others = list(_shaped_by(thing))
-    return any(
-        _is_animated(other) or (isinstance(other, bpy.types.Object) and moves(other))
-        for other in others
-    ) or bool(others and moves(thing))
-
-
-def _shaped_by(thing: bpy.types.Object) -> Iterator[bpy.types.ID]:
-    """Objects and textures that an object's modifiers refer to."""
-    for part in thing.modifiers:
-        for name, kind in part.bl_rna.properties.items():
-            if kind.type != "POINTER":
-                continue
-            value = getattr(part, name)
-            if isinstance(value, bpy.types.Collection):
-                yield from value.all_objects
-            elif isinstance(value, bpy.types.ID):
-                yield value
+def cuts_of(scene: bpy.types.Scene) -> list[bpy.types.TimelineMarker]:
+    """Markers that choose a camera: Blender passes by those of cameras that renders do not
+    show."""
+    markers = scene.timeline_markers
+    return [made for made in markers if made.camera and not made.camera.hide_render]
 
 
 def _appears(thing: bpy.types.Object) -> bool:
-    return any(path.startswith("hide") for path in _paths(thing))
+    return any(path.startswith("hide") for path in animated_paths(thing))
 
 
 def _is_untold(
@@ -118,14 +81,19 @@ def _is_untold(
     if any(camera.type != "CAMERA" or camera.hide_viewport for camera in cameras):
         return True
     things = [*scene.objects, *shown]
-    owners = {part: None for thing in things for part in (thing, thing.data) if part}
-    if any(_runs_script(owner) for owner in owners):
+    owners = {
+        part
+        for thing in things
+        for part in (thing, thing.data, getattr(thing.data, "shape_keys", None))
+    }
+    if any(_runs_script(owner) for owner in owners if owner):
         return True
-    if any(part.type in FROM_ELSEWHERE for thing in things for part in thing.constraints):
+    bones = [bone for thing in things if thing.pose for bone in thing.pose.bones]
+    if any(part.type in FROM_ELSEWHERE for one in (*things, *bones) for part in one.constraints):
         return True
-    if any(not MOVED.match(path) for thing in found for path in _paths(thing)):
+    if any(not MOVED.match(path) for thing in found for path in animated_paths(thing)):
         return True
-    return any(not LENS.match(path) for camera in cameras for path in _paths(camera.data))
+    return any(not LENS.match(path) for camera in cameras for path in animated_paths(camera.data))
 
 
 def _runs_script(owner: bpy.types.ID) -> bool:
@@ -140,23 +108,3 @@ def _runs_script(owner: bpy.types.ID) -> bool:
         for driver in drivers
         for variable in driver.variables
     )
-
-
-def _paths(owner: bpy.types.ID) -> Iterator[str]:
-    """All properties of something that its keys, drivers and strips change."""
-    made = getattr(owner, "animation_data", None)
-    if not made:
-        return
-    yield from (curve.data_path for curve in made.drivers)
-    actions = [made.action, *_actions(s for track in made.nla_tracks for s in track.strips)]
-    for action in filter(None, actions):
-        for layer in action.layers:
-            for strip in layer.strips:
-                for bag in strip.channelbags:
-                    yield from (curve.data_path for curve in bag.fcurves)
-
-
-def _actions(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.Action | None]:
-    for strip in strips:
-        yield strip.action
-        yield from _actions(strip.strips)

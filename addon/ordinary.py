@@ -7,8 +7,9 @@ from collections.abc import Iterable, Iterator
 
 import bpy
 
+from .motion import cameras_of
 from .passes import users_layers
-from .shapes import Shape
+from .shapes import Shape, are_flattened
 from .views import is_ordinary
 
 SOLID = {"MESH", "EMPTY", "LIGHT", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE"}
@@ -30,8 +31,7 @@ def shown_things(things: Iterable[bpy.types.Object]) -> Iterator[bpy.types.Objec
 def is_seen_as_rendered(scene: bpy.types.Scene, shown: Iterable[bpy.types.Object]) -> bool:
     """Whether rays through what the viewport shows tell what a render would: with an ordinary
     camera and nothing that looks otherwise in renders."""
-    marked = [made.camera for made in scene.timeline_markers if made.camera]
-    if not all(is_ordinary(camera) for camera in (scene.camera, *marked)):
+    if not all(is_ordinary(camera) for camera in cameras_of(scene)):
         return False
     if scene.render.use_multiview or scene.background_set or len(users_layers(scene)) > 1:
         return False
@@ -46,7 +46,9 @@ def is_all_met(
     scene: bpy.types.Scene, shown: Iterable[bpy.types.Object], shapes: Iterable[Shape]
 ) -> bool:
     """Whether rays meet every surface that renders show. shapes: that they meet."""
-    shown, own = list(shown), set(scene.objects)
+    shown, own, shapes = list(shown), set(scene.objects), list(shapes)
+    if are_flattened(shapes):
+        return False
     makers = [thing for thing in shown if thing.instance_type != "NONE"]
     return all(
         thing.type in SOLID

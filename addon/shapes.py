@@ -33,6 +33,12 @@ WIDER = 1e-5
 """Boxes are so much larger than what is in them, as a part of their size and distance: a ray that
 grazes a shape meets its box."""
 
+THIN = 1e-5
+"""Of what scales one axis by so much less than another, rays in its own axes tell badly."""
+
+LINE = 1e-7
+"""The same for two axes: nothing of it is left to be seen."""
+
 Key = tuple[Any, ...]
 """What tells a shape from all others in any of a scene's frames."""
 
@@ -92,6 +98,14 @@ class Hit:
     point: Vector
     normal: Vector
     things: tuple[bpy.types.Object, ...]
+
+
+def are_flattened(shapes: Iterable[Shape]) -> bool:
+    """Whether renders show any of them as a sheet that rays do not meet, or badly: not if nothing
+    is left of it."""
+    matrices = [np.array(shape.matrix.to_3x3()) for shape in shapes]
+    sizes = np.linalg.svd(np.array(matrices).reshape(-1, 3, 3), compute_uv=False)
+    return bool(((sizes[:, 1] > LINE * sizes[:, 0]) & (sizes[:, 2] < THIN * sizes[:, 0])).any())
 
 
 class Crowd:
@@ -202,12 +216,15 @@ def _groups(centres: NDArray[np.float64]) -> list[NDArray[np.intp]]:
 
 
 def shapes_of(graph: bpy.types.Depsgraph) -> dict[Key, Shape] | None:
-    """All shapes that a scene shows, as it is evaluated; None: too many to be looked at."""
+    """All shapes that a scene shows, as it is evaluated; None: too many to be looked at, or
+    geometry nodes make points, curves or volumes, which rays do not meet."""
     found: dict[Key, Shape] = {}
     made: dict[int, tuple[Callable, Matrix] | None] = {}
     for entry in graph.object_instances:
         thing = entry.instance_object if entry.is_instance else entry.object
         shown = entry.object
+        if shown.type != "MESH" and shown.original.type == "MESH":
+            return None
         if shown.type != "MESH" or not (entry.is_instance or entry.show_self):
             continue
         if len(found) >= MOST_SHAPES:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from mathutils import Quaternion, Vector
+from mathutils import Matrix, Vector
 
 FINER = 2
 """Pixels of a map in a picture's finest one, whose filter is narrower than the pixel."""
@@ -15,12 +15,12 @@ FINER = 2
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """place, turn: of a camera in the scene's axes. corners: of its picture, top right, bottom
-    right, bottom left and top left, as directions in the camera's axes. near, far: of what it
-    shows."""
+    """place, turn: of a camera in the scene's axes, (3, 3), which may mirror as well. corners: of
+    its picture, top right, bottom right, bottom left and top left, as directions in the camera's
+    axes. near, far: of what it shows."""
 
     place: Vector
-    turn: Quaternion
+    turn: Matrix
     corners: tuple[Vector, ...]
     near: float
     far: float
@@ -29,13 +29,15 @@ class View:
         """Start and direction through a point of the picture, (0, 0) its upper left."""
         top_right, bottom_right, bottom_left, top_left = self.corners
         left, right = top_left.lerp(bottom_left, down), top_right.lerp(bottom_right, down)
-        direction = self.turn @ left.lerp(right, across).normalized()
+        direction = (self.turn @ left.lerp(right, across)).normalized()
         return self.place + direction * self.near, direction
 
 
 def is_ordinary(camera: bpy.types.Object | None) -> bool:
     """Whether a view tells all that a camera shows."""
-    return camera is not None and camera.type == "CAMERA" and camera.data.type == "PERSP"
+    if camera is None or camera.type != "CAMERA" or camera.data.type != "PERSP":
+        return False
+    return camera.matrix_world.determinant() != 0
 
 
 def view_of(scene: bpy.types.Scene, camera: bpy.types.Object) -> View:
@@ -44,7 +46,7 @@ def view_of(scene: bpy.types.Scene, camera: bpy.types.Object) -> View:
     matrix = camera.matrix_world
     return View(
         matrix.translation.copy(),
-        matrix.to_quaternion(),
+        matrix.to_3x3().normalized(),  # its size does not matter, a mirror does
         tuple(corner.copy() for corner in data.view_frame(scene=scene)),
         data.clip_start,
         data.clip_end,

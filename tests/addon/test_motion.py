@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
+import time
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix, Vector
 
+from sunsplit.addon import changes, frames
+from sunsplit.addon.frames import read_frames
 from sunsplit.addon.moments import FEWEST, MOST
+from sunsplit.addon.motion import moving
 from sunsplit.addon.rays import Reach
 from sunsplit.addon.scene_needs import needs_of
 from sunsplit.addon.steps import run_at_once
 from tests.blender import (
     add_mesh,
+    ball_mesh,
     box_mesh,
     camera_towards,
     diffuse,
@@ -150,7 +158,61 @@ def be_an_instance(scene):
     open_door(scene=type("Of", (), {"objects": {"Door": door}}))
 
 
-@pytest.mark.parametrize("moved_by", [drive, hang_on_what_turns, follow, be_an_instance])
+def run_along_a_path(scene):
+    path = bpy.data.curves.new("Path", "CURVE")
+    path.dimensions, path.use_path = "3D", True
+    line = path.splines.new("POLY")
+    line.points.add(1)
+    line.points[1].co = (0, 8, 0, 1)
+    for frame, along in ((1, 0), (100, path.path_duration)):
+        path.eval_time = along
+        path.keyframe_insert("eval_time", frame=frame)
+    rail = bpy.data.objects.new("Rail", path)
+    scene.collection.objects.link(rail)
+    rail.hide_render = True
+    scene.objects["Door"].parent = rail
+
+
+def rig_of_one_bone(scene):
+    rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    scene.collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    bone = rig.data.edit_bones.new("Bone")
+    bone.head, bone.tail = (2, 2, -1), (2, 2, 0)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    rig.hide_render = True
+    return rig
+
+
+def hang_on_a_bone(scene):
+    rig = rig_of_one_bone(scene)
+    door = scene.objects["Door"]
+    door.parent, door.parent_type, door.parent_bone = rig, "BONE", "Bone"
+    door.matrix_world = Matrix.Translation((2.005, 2, -4))
+    return rig.pose.bones["Bone"]
+
+
+def hang_on_a_bone_that_follows(scene):
+    bone = hang_on_a_bone(scene)
+    turned = bpy.data.objects.new("Turned", None)
+    scene.collection.objects.link(turned)
+    turn(turned, (0, 80))
+    following = bone.constraints.new("COPY_ROTATION")
+    following.target, following.mix_mode = turned, "AFTER"
+
+
+@pytest.mark.parametrize(
+    "moved_by",
+    [
+        drive,
+        hang_on_what_turns,
+        follow,
+        be_an_instance,
+        run_along_a_path,
+        hang_on_a_bone_that_follows,
+    ],
+)
 def test_whatever_moves_the_door(scene, moved_by):
     moved_by(scene)
     scene.frame_set(1)
@@ -205,6 +267,55 @@ def be_bent_by_what_moves(scene):
     turn(lattice, (0, 10))
 
 
+def be_bent_by_what_changes_its_shape(scene):
+    lattice = bpy.data.objects.new("Lattice", bpy.data.lattices.new("Lattice"))
+    scene.collection.objects.link(lattice)
+    lattice.hide_render = True
+    lattice.shape_key_add()
+    lattice.shape_key_add().keyframe_insert("value", frame=1)
+    scene.objects["Door"].modifiers.new("Lattice", "LATTICE").object = lattice
+
+
+def be_bent_by_a_parent_that_changes_its_shape(scene):
+    be_bent_by_what_changes_its_shape(scene)
+    door = scene.objects["Door"]
+    door.parent, door.parent_type = door.modifiers[0].object, "LATTICE"
+    door.modifiers.clear()
+
+
+def be_bent_along_what_grows(scene):
+    path = bpy.data.curves.new("Path", "CURVE")
+    path.splines.new("POLY").points.add(1)
+    path.keyframe_insert("extrude", frame=1)
+    rail = bpy.data.objects.new("Rail", path)
+    scene.collection.objects.link(rail)
+    rail.hide_render = True
+    scene.objects["Door"].modifiers.new("Curve", "CURVE").object = rail
+
+
+def cut_by(scene, parent=None):
+    cutter = bpy.data.objects.new("Cutter", box_mesh(0.1, 0.1, 0.1))
+    scene.collection.objects.link(cutter)
+    cutter.hide_render, cutter.parent = True, parent
+    scene.objects["Door"].modifiers.new("Cut", "BOOLEAN").object = cutter
+    return cutter
+
+
+def be_cut_by_what_is_rigged(scene):
+    cut_by(scene).modifiers.new("Rig", "ARMATURE").object = rig_of_one_bone(scene)
+
+
+def be_displaced_by_a_film(scene):
+    texture = bpy.data.textures.new("Film", "IMAGE")
+    texture.image = bpy.data.images.new("Film", 4, 4)
+    texture.image.source = "SEQUENCE"
+    scene.objects["Door"].modifiers.new("Film", "DISPLACE").texture = texture
+
+
+def hang_on_a_bone_that_follows_a_film(scene):
+    hang_on_a_bone(scene).constraints.new("FOLLOW_TRACK")
+
+
 def vanish_later(scene):
     scene.objects["Door"].keyframe_insert("hide_render", frame=1)
 
@@ -229,6 +340,12 @@ def jump_in_a_long_film(scene):
         look_at_the_scenes_frame,
         be_simulated,
         be_bent_by_what_moves,
+        be_bent_by_what_changes_its_shape,
+        be_bent_by_a_parent_that_changes_its_shape,
+        be_bent_along_what_grows,
+        be_cut_by_what_is_rigged,
+        be_displaced_by_a_film,
+        hang_on_a_bone_that_follows_a_film,
         vanish_later,
         be_too_quick,
         jump_in_a_long_film,
@@ -241,6 +358,292 @@ def test_what_single_frames_do_not_tell_keeps_all(scene, change):
     assert found.camera_sees_world
     assert found.sight is None
     assert found.looked is None
+
+
+def mirror_at_a_child(scene, door):
+    middle = bpy.data.objects.new("Middle", None)
+    scene.collection.objects.link(middle)
+    middle.parent = door
+    door.modifiers.new("Mirror", "MIRROR").mirror_object = middle
+
+
+def be_cut_by_a_child(scene, door):
+    cut_by(scene, door)
+
+
+def hook_two_to_each_other(scene, door):
+    other = scene.objects["Room"]
+    door.modifiers.new("Hook", "HOOK").object = other
+    other.modifiers.new("Hook", "HOOK").object = door
+
+
+@pytest.mark.parametrize("tie", [mirror_at_a_child, be_cut_by_a_child, hook_two_to_each_other])
+def test_ties_that_lead_in_circles_come_to_an_end(scene, tie):
+    tie(scene, scene.objects["Door"])
+    found = needs(scene)
+    assert not found.camera_sees_world
+    assert found.sight
+    turn_camera(scene, (90, 100))
+    assert needs(scene).looked
+    turn(scene.objects["Door"], (0, 1))
+    assert needs(scene).sight is None
+
+
+def test_each_parent_of_a_long_chain_is_asked_once(scene, monkeypatch):
+    count, parent = 1500, None
+    for _ in range(count):
+        thing = bpy.data.objects.new("Link", None)
+        scene.collection.objects.link(thing)
+        thing.parent = parent
+        parent = thing
+    scene.objects["Door"].parent = parent
+    asked = []
+    leaders = changes._leaders
+
+    def count_leaders(*fact):
+        asked.append(fact)
+        return leaders(*fact)
+
+    monkeypatch.setattr(changes, "_leaders", count_leaders)
+    assert scene.objects["Door"] not in moving(scene, scene.objects)
+    assert len(asked) == len(set(asked)) <= 2 * len(scene.objects)
+    turn(scene.objects["Link"], (0, 1))
+    assert scene.objects["Door"] in moving(scene, scene.objects)
+
+
+def test_what_is_told_does_not_depend_on_the_clock(scene, monkeypatch):
+    open_door(scene)
+    seconds = itertools.count(0, 10)
+    monkeypatch.setattr(time, "perf_counter", lambda: next(seconds))
+    assert needs(scene).looked
+
+
+def test_fewer_frames_are_read_where_each_is_more_work(scene, monkeypatch):
+    scene.frame_end = 200
+    open_door(scene, (1, 200))
+    door = scene.objects["Door"]
+    assert len(read_frames(scene, [scene.camera], [door])) == 200
+    monkeypatch.setattr(frames, "MOST_WORK", 3 * 50)
+    assert 40 < len(read_frames(scene, [scene.camera], [door])) <= 50
+    scene.frame_set(7)
+    assert 7 in [one.frame for one in read_frames(scene, [scene.camera], [door])]
+    hang_on_a_bone_that_follows(scene)
+    fewer = len(read_frames(scene, [scene.camera], [door]))
+    assert 2 < fewer < 40
+    ball = bpy.data.objects.new("Ball", ball_mesh(0.1))
+    scene.collection.objects.link(ball)
+    ball.modifiers.new("Wave", "WAVE")
+    door.parent, door.parent_type = ball, "VERTEX"
+    bpy.context.view_layer.update()
+    assert read_frames(scene, [scene.camera], [door]) is None
+    monkeypatch.setattr(frames, "MOST_WORK", 1e6)
+    assert read_frames(scene, [scene.camera], [door])
+    monkeypatch.setattr(frames, "MOST_THINGS", 1)
+    assert read_frames(scene, [scene.camera], [door]) is None
+
+
+def test_what_is_shown_outside_of_the_range_is_not_rendered(scene):
+    open_door(scene, (300, 400))
+    scene.frame_set(500)
+    found = needs(scene)
+    assert found.looked
+    assert not found.camera_sees_world
+    assert not run_at_once(Reach.steps(found.sight)).escaped
+
+
+def test_only_markers_that_choose_a_camera_are_cuts(scene):
+    scene.frame_end = 5000
+    turn_camera(scene, (90, 100))
+    before = [one.frame for one in read_frames(scene, [scene.camera], [])]
+    scene.timeline_markers.new("Note", frame=1234)
+    assert [one.frame for one in read_frames(scene, [scene.camera], [])] == before
+    scene.timeline_markers.new("Cut", frame=1234).camera = scene.camera
+    after = [one.frame for one in read_frames(scene, [scene.camera], [])]
+    assert sorted({*before, 1233, 1234}) == after
+
+
+@pytest.mark.parametrize("hidden", [(), (1,), (2,), (1, 2)])
+def test_the_camera_that_blender_chooses(scene, hidden):
+    """It passes by markers of cameras that are hidden in renders."""
+    first, cameras = scene.camera, [scene.camera]
+    for x in (1, 2):
+        cameras.append(camera_towards(scene, np.array([-1, 0, 0]), 50, 32))
+        cameras[-1].location[0] = x / 2
+        scene.timeline_markers.new("Cut", frame=10 * x).camera = cameras[-1]
+        cameras[-1].hide_render = x in hidden
+    scene.camera = first
+    bpy.context.view_layer.update()
+    read = {one.frame: one.view.place for one in read_frames(scene, cameras, [])}
+    for frame in (1, 9, 10, 11, 20, 100):
+        scene.frame_set(frame)
+        assert read[frame] == scene.camera.location
+        scene.camera = first
+
+
+def test_a_hidden_camera_does_not_see_the_world(scene):
+    other = camera_towards(scene, np.array([1, 0, 0]), 40, 32)
+    other.location = (5, 0, 0)
+    scene.camera = next(c for c in scene.objects if c.type == "CAMERA" and c != other)
+    scene.timeline_markers.new("A", frame=1).camera = scene.camera
+    scene.timeline_markers.new("B", frame=60).camera = other
+    assert needs(scene).camera_sees_world
+    other.hide_render = True
+    assert not needs(scene).camera_sees_world
+
+
+def test_what_is_flattened_in_some_frame_is_not_told(scene):
+    door = scene.objects["Door"]
+    for frame, size in ((1, 1), (100, 0)):
+        door.scale[0] = size
+        door.keyframe_insert("scale", frame=frame)
+    scene.frame_set(1)
+    assert needs(scene).sight is None
+
+
+def blenders_smooth_by_angle():
+    """The group of the modifier that imported meshes get."""
+    for path in sorted(Path(bpy.utils.system_resource("DATAFILES")).rglob("*.blend")):
+        if path.stem in ("smooth_by_angle", "geometry_nodes_essentials"):
+            with bpy.data.libraries.load(str(path)) as (_, wanted):
+                wanted.node_groups = ["Smooth by Angle"]
+            return wanted.node_groups[0]
+    raise LookupError("Blender's own nodes")
+
+
+def smooth_door(scene):
+    part = scene.objects["Door"].modifiers.new("Smooth by Angle", "NODES")
+    part.node_group = blenders_smooth_by_angle()
+    return part
+
+
+def test_a_mesh_that_is_smooth_by_angle_stands_still_or_moves(scene):
+    smooth_door(scene)
+    found = needs(scene)
+    assert not found.camera_sees_world
+    assert not run_at_once(Reach.steps(found.sight)).escaped
+    open_door(scene)
+    scene.frame_set(1)
+    found = needs(scene)
+    assert found.looked
+    assert run_at_once(Reach.steps(found.sight)).escaped
+
+
+def through(kinds, inner=None):
+    """Nodes of geometry, one after the other."""
+    tree = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    last = tree.nodes.new("NodeGroupInput").outputs[0]
+    for kind in kinds:
+        node = tree.nodes.new(kind)
+        if inner:
+            node.node_tree = inner
+        geometry = [s for s in node.inputs if s.type == "GEOMETRY"]
+        if geometry:
+            tree.links.new(last, geometry[0])
+        last = next((s for s in node.outputs if s.type == "GEOMETRY"), last)
+    tree.links.new(last, tree.nodes.new("NodeGroupOutput").inputs[0])
+    return tree
+
+
+def add_nodes(scene, *kinds, inner=None):
+    tree = through([f"GeometryNode{kind}" for kind in kinds], inner)
+    scene.objects["Door"].modifiers.new("Nodes", "NODES").node_group = tree
+    return tree
+
+
+def key_its_angle(scene):
+    part = smooth_door(scene)
+    if bpy.app.version < (5, 2):
+        part.keyframe_insert('["Input_1"]', frame=1)
+    else:
+        part.properties.inputs.Input_1.keyframe_insert("value", frame=1)
+
+
+def key_a_node(scene):
+    tree = add_nodes(scene, "SetPosition")
+    tree.nodes["Set Position"].inputs["Offset"].keyframe_insert("default_value", frame=1)
+
+
+def look_at_the_time(scene):
+    add_nodes(scene, "SetShadeSmooth", "InputSceneTime")
+
+
+def look_at_the_time_in_a_group(scene):
+    inner = through(["GeometryNodeInputSceneTime"])
+    add_nodes(scene, "Group", inner=inner)
+
+
+def look_at_another_object(scene):
+    add_nodes(scene, "ObjectInfo")
+
+
+def be_simulated_by_nodes(scene):
+    tree = add_nodes(scene, "SetShadeSmooth")
+    begin, end = (tree.nodes.new(f"GeometryNodeSimulation{way}put") for way in ("In", "Out"))
+    begin.pair_with_output(end)
+
+
+def look_otherwise_in_renders(scene):
+    add_nodes(scene, "IsViewport")
+
+
+def wear_what_nodes_choose(scene):
+    add_nodes(scene, "SetMaterial")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        key_its_angle,
+        key_a_node,
+        look_at_the_time,
+        look_at_the_time_in_a_group,
+        look_at_another_object,
+        be_simulated_by_nodes,
+        look_otherwise_in_renders,
+        wear_what_nodes_choose,
+    ],
+)
+def test_nodes_that_may_make_something_else(scene, change):
+    change(scene)
+    assert needs(scene).sight is None
+
+
+def test_groups_in_groups_stand_still(scene):
+    add_nodes(scene, "Group", inner=through(["GeometryNodeSetShadeSmooth"]))
+    assert needs(scene).sight
+
+
+@pytest.mark.parametrize("made", ["Points", "CurvePrimitiveCircle", "VolumeCube"])
+def test_what_rays_do_not_meet_is_not_told(scene, made):
+    add_nodes(scene, "MeshCube")
+    assert needs(scene).sight
+    scene.objects["Door"].modifiers.clear()
+    add_nodes(scene, made)
+    assert needs(scene).sight is None
+
+
+def test_instances_that_nodes_make_move_with_their_object(scene):
+    """A door of four leaves, of which the last opens the door."""
+    tree = add_nodes(scene, "MeshLine")
+    line = tree.nodes["Mesh Line"]
+    line.inputs["Count"].default_value = 4
+    line.inputs["Offset"].default_value = (0, 1, 0)
+    line.inputs["Start Location"].default_value = (0, -3.5, 4)
+    leaf, spread = (tree.nodes.new(f"GeometryNode{k}") for k in ("MeshCube", "InstanceOnPoints"))
+    leaf.inputs["Size"].default_value = (0.02, 1, 8)
+    tree.links.new(line.outputs[0], spread.inputs["Points"])
+    tree.links.new(leaf.outputs[0], spread.inputs["Instance"])
+    tree.links.new(spread.outputs[0], tree.nodes["Group Output"].inputs[0])
+    found = needs(scene)
+    assert len(found.sight.shapes) == 1 + 4
+    assert not run_at_once(Reach.steps(found.sight)).escaped
+    open_door(scene)
+    scene.frame_set(1)
+    found = needs(scene)
+    assert found.looked
+    assert run_at_once(Reach.steps(found.sight)).escaped
 
 
 def test_the_scene_is_left_as_it_was(scene):
@@ -280,8 +683,6 @@ def test_the_scene_is_left_as_it_was(scene):
 
 
 def test_frames_are_given_back_when_reading_them_fails(scene, monkeypatch):
-    from sunsplit.addon import frames
-
     open_door(scene)
 
     def fail(*_):

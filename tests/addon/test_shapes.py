@@ -229,3 +229,23 @@ def test_instances_that_rays_meet_and_renders_do_not_show_or_the_other_way_round
     change(*forest(scene, sunrise))
     bpy.context.view_layer.update()
     assert needs_of(scene).sight is None
+
+
+def test_what_a_scale_flattens_is_shown_but_not_met(scene, sunrise):
+    """A sheet, not what is nothing any more."""
+    hdri_world(scene, sunrise)
+    add_mesh(scene, plate_mesh(100), diffuse("Ground", 0.5), Matrix())
+    ball = bpy.data.objects.new("Ball", ball_mesh(0.5))
+    scene.collection.objects.link(ball)
+    camera_towards(scene, np.array([0, 1, -0.2]), 60, 32).location = (0, 0, 2)
+    for size, told in (
+        ((1, 1, 1), True),
+        ((0, 0, 0), True),
+        ((1, 1, 0), False),
+        ((1, 1e-7, 1), False),
+        ((1e-7, 1e-7, 1e-7), True),
+        ((1, 1, 1e-3), True),
+    ):
+        ball.scale = size
+        bpy.context.view_layer.update()
+        assert (needs_of(scene).sight is not None) is told
