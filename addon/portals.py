@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..core import sphere
 from ..core.conversion import Conversion
 from ..core.environment import LUMINANCE_WEIGHTS, luminance
-from ..core.openings import WIDEST, Inside, Opening, find_openings, part_seen
+from ..core.openings import WIDEST, Inside, Opening, find_openings, may_be_closed, part_seen
 from ..core.portal_noise import LightInside
 from ..core.sums import weighted_sum
 from .images import READ
@@ -73,6 +73,8 @@ def closed_scene(reach: Reach) -> Steps[ClosedScene | None]:
             break
         reach.follow_another(moments[path % len(moments)])
         yield
+    if not may_be_closed(len(reach.escaped), LOOKS * len(reach.places)):
+        return None
     inside, openings = yield Apart(lambda _, in_main: _openings(reach, in_main), READ, READ)
     return ClosedScene(reach, inside, openings) if openings else None
 

@@ -137,9 +137,7 @@ class _Plane:
 def find_openings(inside: Inside) -> tuple[Opening, ...]:
     """The openings of a closed scene, the most important first; none where it is not closed, or
     where some of what gets out is not explained by them."""
-    count, looks = len(inside.escaped), inside.looks * len(inside.places)
-    # At most all looks of the places outside get out, and few of those inside.
-    if not FEWEST <= count <= looks * (1 - INSIDE + INSIDE * WIDEST):
+    if not may_be_closed(len(inside.escaped), inside.looks * len(inside.places)):
         return ()
     if len(inside.points) < FEWEST:  # nothing stops light
         return ()
@@ -155,6 +153,12 @@ def find_openings(inside: Inside) -> tuple[Opening, ...]:
         found.append(opening)
         left &= opening.is_before(starts) & ~opening.is_crossed(starts, inside.escaped)
     return tuple(found) if found and _is_closed(inside, found) else ()
+
+
+def may_be_closed(escaped: int, looks: int) -> bool:
+    """Whether so many of all looks may have got out of a closed scene: all of those from places
+    outside, and few from inside, but enough to tell openings by."""
+    return FEWEST <= escaped <= looks * (1 - INSIDE + INSIDE * WIDEST)
 
 
 def part_seen(inside: Inside, found: Sequence[Opening]) -> float:
