@@ -11,6 +11,7 @@ import OpenEXR
 from mathutils import Matrix, Vector
 
 import sunsplit
+from sunsplit.addon.rig import GUARD
 
 
 def fresh_scene() -> bpy.types.Scene:
@@ -80,8 +81,9 @@ def add_mapping(texture: bpy.types.Node) -> bpy.types.Node:
 
 
 def suns(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """The lamps of a conversion, in their order."""
-    return [thing for thing in scene.sunsplit.collection.objects if thing.type == "LIGHT"]
+    """The lamps of a conversion, in their order; not what guards Cycles' light tree."""
+    lamps = [thing for thing in scene.sunsplit.collection.objects if thing.type == "LIGHT"]
+    return [lamp for lamp in lamps if not lamp.get(GUARD)]
 
 
 def to_light(lamp: bpy.types.Object) -> np.ndarray:
