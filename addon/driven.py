@@ -56,7 +56,10 @@ class Formula:
             else:
                 getattr(owner, path)[index] = now
             return
-        driver = owner.driver_add(path, index).driver
+        curve = owner.driver_add(path, index)
+        # It comes with points at 0 and 1, which it snaps to from within a ten thousandth.
+        curve.keyframe_points.clear()
+        driver = curve.driver
         driver.type = "SCRIPTED"
         for name, (kind, source, source_path) in used.items():
             variable = driver.variables.new()

@@ -61,6 +61,19 @@ def test_every_kind_of_mapping(two_suns, kind, first, second):
     assert_lamps_are_where_the_map_shows_them(scene, in_map)
 
 
+@pytest.mark.parametrize("kind", ["POINT", "TEXTURE"])
+@pytest.mark.parametrize("least", [2e-5, -2e-5])
+def test_lamps_follow_the_least_turn(two_suns, kind, least):
+    scene = fresh_scene()
+    mapping = add_mapping(hdri_world(scene, two_suns))
+    mapping.vector_type = kind
+    bpy.ops.sunsplit.convert()
+    before = to_light(suns(scene)[0])
+    scene.world.node_tree.nodes["Mapping"].inputs["Rotation"].default_value[2] = least
+    moved = np.linalg.norm(to_light(suns(scene)[0]) - before)
+    assert moved == pytest.approx(abs(least) * np.hypot(*before[:2]), rel=0.05)
+
+
 def vector_rotate(texture, kind):
     tree = texture.id_data
     turn = tree.nodes.new("ShaderNodeVectorRotate")
