@@ -104,8 +104,13 @@ def _taken(path: Path) -> BinaryIO | None:
     folder = path.parent
     try:
         folder.mkdir(exist_ok=True)
-        return take(path)
-    except (FileNotFoundError, FileExistsError):
-        if folder.is_file() or folder.is_symlink() or not folder.parent.is_dir():
+    except FileExistsError:
+        if folder.is_file() or folder.is_symlink():
             raise
-        return None  # another one has removed the folder between two of these steps
+        return None  # another one has removed the folder since
+    try:
+        return take(path)
+    except FileNotFoundError:
+        if folder.is_symlink() or not folder.parent.is_dir():
+            raise
+        return None  # the same
