@@ -37,11 +37,16 @@ WARMER = 2.15
 
 
 def make_lamps(
-    suns: Sequence[Sun], light: WorldLight, rig: Rig, world: bpy.types.World
+    suns: Sequence[Sun],
+    light: WorldLight,
+    rig: Rig,
+    world: bpy.types.World,
+    unmet_width: float = 0.0,
 ) -> list[bpy.types.Object]:
     """One lamp for each sun, aimed and tinted as the world shows the map; in no collection yet.
 
     light: of `world`, the converted one: what it does to rays of each kind, its lamps do too.
+    unmet_width: of the widest suns that surfaces' own rays need not meet, in radians.
     """
     lamps = []
     for sun in suns:
@@ -53,7 +58,7 @@ def make_lamps(
         to_light = rig.from_map @ sun.to_light
         _aim(lamp, to_light)
         lamp.location = FARTHEST * to_light / np.linalg.norm(to_light)
-        _set_visibility(lamp, world)
+        _set_visibility(lamp, world, sun.angular_diameter > unmet_width)
         lamps.append(lamp)
     return lamps
 
@@ -126,14 +131,15 @@ def _aim(lamp: bpy.types.Object, to_light: NDArray[np.float64]) -> None:
     lamp.rotation_quaternion = Vector(to_light).to_track_quat("Z", "Y")
 
 
-def _set_visibility(lamp: bpy.types.Object, world: bpy.types.World) -> None:
-    """The camera sees the sun in the original map, every other ray in the lamp: once each."""
+def _set_visibility(lamp: bpy.types.Object, world: bpy.types.World, is_met: bool) -> None:
+    """The camera sees the sun in the original map, every other ray in the lamp: once each. is_met:
+    by rays that go on from surfaces, besides being looked for."""
     lamp.visible_camera = False
     lamp.lightgroup = world.lightgroup
     if not hasattr(world, "cycles"):  # Cycles is switched off
         return
-    # Without it no glossy ray meets the disc, and a mirror shows no sun.
-    lamp.data.cycles.use_multiple_importance_sampling = True
+    # Without it no ray meets the disc, and a mirror shows no sun.
+    lamp.data.cycles.use_multiple_importance_sampling = is_met
     lamp.data.cycles.max_bounces = world.cycles.max_bounces
     rays = world.cycles_visibility
     lamp.visible_diffuse = rays.diffuse

@@ -97,6 +97,13 @@ def skipped_sentences(
             "it gets a map that wide instead of {own}."
         )
         lines.append(text.format(shown=shown, own=own))
+    if any(sun.angular_diameter <= needs.unmet_width for sun in conversion.suns):
+        lines.append(
+            said(
+                "Skipped: nothing mirrors sharply, so rays need not meet lamps by chance; Cycles "
+                "looks for them."
+            )
+        )
     if tree_off:
         lines.append(said("Skipped: the light tree, as the lamps are cheaper without and alone."))
     return lines

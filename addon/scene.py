@@ -154,7 +154,7 @@ def _replace(
     light = find_light(new, scene.render.engine)  # the same, in the new world
     rig = make_rig(light.texture)
     keep_factors(state.sky, rig.sky)
-    lamps = make_lamps(conversion.suns, light, rig, new)
+    lamps = make_lamps(conversion.suns, light, rig, new, needs.unmet_width)
     guards = make_guards(rig, lamps) if tree.guarded else []
     sentences = [
         *made_sentences(conversion),

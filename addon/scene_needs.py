@@ -14,36 +14,30 @@ from ..core.environment import whole_part, whole_part_from
 from .moments import Panes, Sight, sight_of
 from .ordinary import is_all_met, is_seen_as_rendered, shown_things
 from .rig import guards_of, rig_of
+from .shaders import ANY, is_seen_through, is_sharp, is_translucent, shines, unmet_width
 from .steps import Steps, run_at_once
 from .views import finest_width, is_ordinary, view_of
-
-SHARP = 0.25
-"""Roughness below which a surface may show single pixels of a wide map."""
 
 LIGHTING_WIDTH = 1024
 """Pixels of a map that only lights: without its suns nothing in it is narrower than a third of a
 degree, as far as rougher surfaces and shadows can tell."""
-
-TRANSLUCENT = {
-    *("BSDF_GLASS", "BSDF_REFRACTION", "BSDF_TRANSLUCENT", "SUBSURFACE_SCATTERING"),
-    *("BSDF_HAIR", "BSDF_HAIR_PRINCIPLED"),
-}
-"""Shaders, besides those that one sees through, that light comes through."""
 
 
 @dataclass(frozen=True)
 class SceneNeeds:
     """camera_sees_world: or a render may show it behind transparent things. mirrors: something
     reflects or refracts sharply. other_lights: something but the world and lamps of conversions
-    gives light. fog: something may scatter light on its way. camera_width: pixels around the sphere
-    that a picture can tell apart; None: any. sight: the scene for rays that ask what light
-    reaches; None: they would not tell. looked: where anything moves, how many frames were looked
-    at, and the first and last of their range."""
+    gives light. fog: something may scatter light on its way. unmet_width: angular diameter, in
+    radians, of the widest suns that rays need not meet (see `shaders`). camera_width: pixels around
+    the sphere that a picture can tell apart; None: any. sight: the scene for rays that ask what
+    light reaches; None: they would not tell. looked: where anything moves, how many frames were
+    looked at, and the first and last of their range."""
 
     camera_sees_world: bool
     mirrors: bool
     other_lights: bool
     fog: bool = False
+    unmet_width: float = 0.0
     camera_width: int | None = None
     sight: Sight | None = field(default=None, compare=False)
     looked: tuple[int, int, int] | None = None
@@ -76,7 +70,7 @@ def needs_steps(scene: bpy.types.Scene, look: bool = True) -> Steps[SceneNeeds]:
     shown = users_things(scene)
     trees = _trees(scene, shown)
     nodes = [node for tree in trees for node in _nodes(tree)]
-    lights = any(thing.type == "LIGHT" for thing in shown) or any(_shines(node) for node in nodes)
+    lights = any(thing.type == "LIGHT" for thing in shown) or any(shines(node) for node in nodes)
     fog = _is_foggy(scene, nodes)
     changes = any(tree.animation_data for tree in trees)
     if changes or any(node.type == "SCRIPT" for node in nodes):
@@ -89,9 +83,10 @@ def needs_steps(scene: bpy.types.Scene, look: bool = True) -> Steps[SceneNeeds]:
     sees_world = yield from _sees_world(scene, nodes, sight)
     return SceneNeeds(
         camera_sees_world=sees_world,
-        mirrors=any(_is_sharp(node) for node in nodes),
+        mirrors=any(is_sharp(node) for node in nodes),
         other_lights=lights,
         fog=fog,
+        unmet_width=0.0 if fog else min(map(unmet_width, nodes), default=ANY),
         camera_width=_camera_width(scene, sight),
         sight=sight if sight and _is_told_by_rays(scene, shown, nodes, sight) else None,
         looked=(len(sight.moments), *sight.frames) if sight and sight.frames else None,
@@ -149,7 +144,7 @@ def _lets_light_through(thing: bpy.types.Object) -> bool:
     if thing.type == "MESH" and not (thing.visible_shadow and thing.visible_diffuse):
         return True
     trees = [s.material.node_tree for s in thing.material_slots if s.material]
-    return any(_is_translucent(node) for tree in trees if tree for node in _nodes(tree))
+    return any(is_translucent(node) for tree in trees if tree for node in _nodes(tree))
 
 
 def _is_shadowless(thing: bpy.types.Object) -> bool:
@@ -157,14 +152,7 @@ def _is_shadowless(thing: bpy.types.Object) -> bool:
     if thing.type == "MESH" and not thing.visible_shadow:
         return True
     trees = [s.material.node_tree for s in thing.material_slots if s.material]
-    return any(_is_seen_through(node) for tree in trees if tree for node in _nodes(tree))
-
-
-def _is_translucent(node: bpy.types.Node) -> bool:
-    if node.type == "BSDF_PRINCIPLED":
-        inside = ("Transmission Weight", "Subsurface Weight")
-        return _is_seen_through(node) or any(_is_above(node, name, 0) for name in inside)
-    return _is_seen_through(node) or node.type in TRANSLUCENT
+    return any(is_seen_through(node) for tree in trees if tree for node in _nodes(tree))
 
 
 def _trees(scene: bpy.types.Scene, shown: list[bpy.types.Object]) -> list[bpy.types.NodeTree]:
@@ -191,44 +179,12 @@ def _nodes(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:
             yield from _nodes(node.node_tree)
 
 
-def _is_above(node: bpy.types.Node, name: str, value: float) -> bool:
-    socket = node.inputs.get(name)
-    return socket is not None and (socket.is_linked or socket.default_value > value)
-
-
-def _shines(node: bpy.types.Node) -> bool:
-    glow = ("Emission Strength", "Blackbody Intensity")
-    return node.type == "EMISSION" or any(_is_above(node, name, 0) for name in glow)
-
-
-def _is_sharp(node: bpy.types.Node) -> bool:
-    if node.type == "BSDF_PRINCIPLED":
-        coated = _is_above(node, "Coat Weight", 0) and _is_smooth(node, "Coat Roughness")
-        return coated or _is_smooth(node, "Roughness")
-    shiny = ("BSDF_GLOSSY", "BSDF_ANISOTROPIC", "BSDF_GLASS", "BSDF_REFRACTION", "BSDF_METALLIC")
-    return node.type in shiny and _is_smooth(node, "Roughness")
-
-
-def _is_smooth(node: bpy.types.Node, name: str) -> bool:
-    socket = node.inputs.get(name)
-    return socket is None or socket.is_linked or socket.default_value < SHARP
-
-
-def _is_seen_through(node: bpy.types.Node) -> bool:
-    if node.type == "BSDF_PRINCIPLED":
-        alpha = node.inputs["Alpha"]
-        return alpha.is_linked or alpha.default_value < 1
-    if node.type == "OUTPUT_MATERIAL":  # of a volume without a surface
-        return not node.inputs["Surface"].is_linked
-    return node.type in ("BSDF_TRANSPARENT", "BSDF_RAY_PORTAL", "HOLDOUT")
-
-
 def _sees_world(
     scene: bpy.types.Scene, nodes: list[bpy.types.Node], sight: Sight | None
 ) -> Steps[bool]:
     """Whether a camera ray may reach the world."""
     if scene.render.film_transparent:
         return False
-    if sight is None or any(_is_seen_through(node) for node in nodes):
+    if sight is None or any(is_seen_through(node) for node in nodes):
         return True
     return (yield from sight.camera_sees_world())

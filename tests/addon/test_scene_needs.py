@@ -160,6 +160,70 @@ def test_a_roughness_that_cannot_be_told_is_sharp(scene):
     assert needs_of(scene).mirrors
 
 
+@pytest.mark.parametrize(
+    ("inputs", "degrees"),
+    [
+        ({"Roughness": 0.5}, 30),
+        ({"Roughness": 0.39}, 3),
+        ({"Roughness": 0.5, "Metallic": 1.0}, 3),
+        ({"Roughness": 0.5, "Specular_IOR_Level": 0.6}, 3),
+        ({"Roughness": 0.5, "Coat_Weight": 0.3, "Coat_Roughness": 0.4}, 3),
+        ({"Roughness": 0.2}, 0),
+    ],
+)
+def test_suns_that_need_not_be_met(scene, inputs, degrees):
+    assert needs_of(scene).unmet_width == pytest.approx(np.pi)
+    made = material("New", (1, 1, 1), **inputs)
+    add_mesh(scene, plate_mesh(0.1), made, Matrix())
+    assert needs_of(scene).unmet_width == pytest.approx(np.radians(degrees))
+
+
+@pytest.mark.parametrize(
+    ("kind", "degrees"),
+    [
+        ("ShaderNodeBsdfTranslucent", 180),
+        ("ShaderNodeEmission", 180),
+        ("ShaderNodeTexNoise", 180),
+        ("ShaderNodeBsdfGlossy", 3),
+        ("ShaderNodeBsdfGlass", 0),  # as sharp as it comes
+        ("ShaderNodeBsdfToon", 0),
+        ("ShaderNodeBsdfHair", 0),
+    ],
+)
+def test_shaders_that_need_not_meet_suns(scene, kind, degrees):
+    made = diffuse("New", 0.5)
+    shader = made.node_tree.nodes.new(kind)
+    if kind == "ShaderNodeBsdfGlossy":
+        shader.inputs["Roughness"].default_value = 0.5
+    add_mesh(scene, plate_mesh(0.1), made, Matrix())
+    assert needs_of(scene).unmet_width == pytest.approx(np.radians(degrees))
+
+
+def test_in_fog_suns_are_met(scene):
+    fill_with_fog(scene)
+    assert needs_of(scene).unmet_width == 0
+
+
+def are_met(scene) -> list[bool]:
+    return [lamp.data.cycles.use_multiple_importance_sampling for lamp in suns(scene)]
+
+
+def test_rays_meet_suns_where_something_mirrors_them(scene):
+    move_camera_out(scene)
+    said = "rays need not meet lamps"
+    bpy.ops.sunsplit.convert(lights=2)
+    assert are_met(scene) == [False, False]
+    assert said in scene.sunsplit.report
+    bpy.ops.sunsplit.convert(lights=2, skips=False)
+    assert are_met(scene) == [True, True]
+    assert said not in scene.sunsplit.report
+    chrome = material("Chrome", (1, 1, 1), Metallic=1.0, Roughness=0.0)
+    add_mesh(scene, plate_mesh(0.1), chrome, Matrix())
+    bpy.ops.sunsplit.convert(lights=2)
+    assert are_met(scene) == [True, True]
+    assert said not in scene.sunsplit.report
+
+
 def test_glowing_things_and_lamps_are_other_lights(scene):
     assert not needs_of(scene).other_lights
     glowing = material("New", (1, 1, 1), Emission_Strength=2)

@@ -24,6 +24,7 @@ from tests.benchmarks import (
     light_tree,
     lights,
     looking,
+    met_suns,
     methods,
     one_light,
     portals,
@@ -116,6 +117,15 @@ def test_light_tree(tmp_path, sunrise):
     assert [one.lamps for one in results] == sorted(one.lamps for one in results)
     assert all(min(*one.noise, *one.seconds) > 0 for one in results)
     assert "| product |" in (tmp_path / "light_tree.md").read_text()
+
+
+def test_met_suns(tmp_path, sunrise):
+    few = ["--size", "12", "--samples", "4", "--repeats", "2", "-o", str(tmp_path)]
+    results = met_suns.main([str(sunrise), *few, "--materials", "diffuse", "metal 0.25"])
+    assert all(min(*one.variance, *one.seconds) > 0 for one in results)
+    widest = max(results[0].widths)
+    assert [one.chosen == widest for one in results] == [True, False]
+    assert "| metal 0.25 |" in (tmp_path / "met_suns.md").read_text()
 
 
 def test_portals(tmp_path, sunrise):
