@@ -188,6 +188,19 @@ def render(scene: bpy.types.Scene, folder: Path, samples: int, seed: int = 0) ->
     return timed_render(scene, folder, samples, seed)[0]
 
 
+def renders(scene: bpy.types.Scene, folder: Path, samples: int, seeds: int) -> list[np.ndarray]:
+    """Renders of one scene by so many seeds, as by `render`, bit for bit.
+
+    What Cycles makes of the scene is made once: of a map alone it takes longer than a small picture.
+    """
+    scene.render.use_persistent_data = True
+    try:
+        return [render(scene, folder, samples, seed) for seed in range(seeds)]
+    finally:
+        # Blender lets go of it: no later render can show what the scene is no more.
+        scene.render.use_persistent_data = False
+
+
 def timed_render(
     scene: bpy.types.Scene, folder: Path, samples: int, seed: int
 ) -> tuple[np.ndarray, float]:
