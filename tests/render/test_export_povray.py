@@ -10,7 +10,7 @@ from sunsplit.core.export.axes import Y_UP_LEFT, Z_UP
 from tests.core.test_export_povray import TURN
 from tests.exporting import MEAN, exported, shadows_agree
 from tests.plates import ALBEDO, ORIENTATIONS, irradiance, unit
-from tests.povray_renders import picture, plate, renderer
+from tests.povray_renders import picture, plate, renderer, together
 from tests.render.compare import estimate_of, means_agree, pixels_agree
 
 SMOOTH = ["+A0.05", "+R3", "-J"]
@@ -48,10 +48,13 @@ def by_axis(lights, tmp_path_factory):
 @pytest.mark.parametrize("normal", ORIENTATIONS.values(), ids=ORIENTATIONS.keys())
 def test_a_white_plate(sunrise, by_axis, normal):
     normal = unit(normal)
-    for up, axes in (("usual", Y_UP_LEFT), ("z", Z_UP)):
-        folder = by_axis[up]
-        found = plate(folder / f"{sunrise.stem}.lights.inc", normal, axes.of)
-        expected = ALBEDO / np.pi * irradiance(sunrise, normal)
+    expected = ALBEDO / np.pi * irradiance(sunrise, normal)
+    axes = {"usual": Y_UP_LEFT.of, "z": Z_UP.of}
+
+    def seen(up):
+        return plate(by_axis[up] / f"{sunrise.stem}.lights.inc", normal, axes[up])
+
+    for up, found in zip(axes, together(seen, axes), strict=True):
         print(f"{up}: ratio - 1 {found.mean((0, 1)) / expected - 1}")
         assert found.mean((0, 1)) == pytest.approx(expected, rel=MEAN)
 
