@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
@@ -186,6 +188,24 @@ def ball_mesh(radius: float) -> bpy.types.Mesh:
 def render(scene: bpy.types.Scene, folder: Path, samples: int, seed: int = 0) -> np.ndarray:
     """Render and give the linear pixels, float64 (height, width, 3)."""
     return timed_render(scene, folder, samples, seed)[0]
+
+
+@contextmanager
+def kept_by_cycles(scene: bpy.types.Scene) -> Iterator[None]:
+    """Until the block ends, Cycles keeps what it has made of a scene from render to render, and
+    makes anew what has changed: of a map alone that takes longer than a small picture does."""
+    scene.render.use_persistent_data = True
+    try:
+        yield
+    finally:
+        # Blender lets go of it here: no later render can show what the scene is no more.
+        scene.render.use_persistent_data = False
+
+
+def renders(scene: bpy.types.Scene, folder: Path, samples: int, seeds: int) -> list[np.ndarray]:
+    """Renders of one scene by so many seeds, as by `render`, bit for bit."""
+    with kept_by_cycles(scene):
+        return [render(scene, folder, samples, seed) for seed in range(seeds)]
 
 
 def timed_render(

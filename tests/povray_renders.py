@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import count
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import OpenEXR
@@ -13,10 +16,22 @@ import OpenEXR
 from tests.installed import not_installed
 from tests.plates import ALBEDO
 
+NUMBERS = count(1)
+"""In names of files, so that several renders can write into one folder at a time."""
+
 HEAD = """#version 3.7;
 global_settings { assumed_gamma 1.0 }
 #default { finish { ambient 0 diffuse 1 } }
 """
+
+
+T = TypeVar("T")
+
+
+def together(render: Callable[[T], np.ndarray], things: Iterable[T]) -> list[np.ndarray]:
+    """Renders of some things at once: of a small picture POV-Ray sleeps through half a second."""
+    with ThreadPoolExecutor() as pool:
+        return list(pool.map(render, things))
 
 
 def renderer() -> str:
@@ -29,8 +44,7 @@ def renderer() -> str:
 
 def picture(scene: Path, width: int, height: int, *options: str) -> np.ndarray:
     """Of a scene's file, linear, float64 (height, width, 3). options: of POV-Ray's command line."""
-    out = scene.with_name("picture.exr")
-    out.unlink(missing_ok=True)
+    out = scene.with_name(f"picture.{next(NUMBERS)}.exr")
     size = [f"+W{width}", f"+H{height}"]
     command = [renderer(), f"+I{scene.name}", "-D", *size, "+FE", f"+O{out.name}", *options]
     # Where it runs is where Debian's lets it read.
@@ -69,7 +83,7 @@ def looking(normal: np.ndarray) -> np.ndarray:
 def sky_seen(lights: Path, backwards: np.ndarray, to_axes: Callable, side: int) -> np.ndarray:
     """What lies around the scene, seen by a camera with a right angle, (side, side, 3)."""
     frame = to_axes(looking(backwards).T).T
-    scene = lights.with_name("sky.pov")
+    scene = lights.with_name(f"sky.{next(NUMBERS)}.pov")
     scene.write_text(f'{HEAD}{camera(np.zeros(3), frame, 2)}#include "{lights.name}"\n')
     return picture(scene, side, side)
 
@@ -91,7 +105,7 @@ def plate(
     frame = looking(normal)
     corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [-1, -1, 0]]) @ frame.T
     points = ", ".join(vector(corner) for corner in to_axes(corners))
-    scene = lights.with_name("plate.pov")
+    scene = lights.with_name(f"plate.{next(NUMBERS)}.pov")
     scene.write_text(
         f"{HEAD}{before}\n"
         f"{camera(to_axes(4 * normal), to_axes(frame.T).T, 0.2)}"

@@ -183,13 +183,13 @@ def main() -> None:
 
     keep(CYCLES, "CYCLES", options.reference)
     keep(AGAIN, "CYCLES", options.reference, seed=1)
-    pictures(scene, folder, EEVEE, 1)  # EEVEE compiles for a while
+    render(scene, folder, EEVEE, 1)  # EEVEE compiles for a while
     keep(DEFAULT, EEVEE, options.samples)
     scene.world.sun_threshold = 0.0
     keep(ZERO, EEVEE, options.samples)
     settings = ConversionSettings(target="eevee")
     found = convert_scene(scene, settings).conversion
-    pictures(scene, folder, EEVEE, 1)
+    render(scene, folder, EEVEE, 1)
     keep(CONVERTED, EEVEE, options.samples)
     keep(CONVERTED_IN_CYCLES, "CYCLES", options.reference)
     done = Renders(

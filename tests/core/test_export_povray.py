@@ -18,7 +18,7 @@ from sunsplit.core.export.skylight import Skylight
 from sunsplit.core.suns import Sun, disc_sun, point_sun
 from tests.files import noise, sunny
 from tests.plates import ALBEDO, ORIENTATIONS, irradiance_by, unit
-from tests.povray_renders import directions_seen, picture, plate, renderer, sky_seen
+from tests.povray_renders import directions_seen, picture, plate, renderer, sky_seen, together
 
 TURN = Rotation.from_euler("xyz", (20, -35, 110), degrees=True).as_matrix()
 
@@ -58,8 +58,10 @@ def test_the_map_lies_where_it_should(tmp_path, up, has_cells):
     particular: an offset of a twentieth of a pixel would fail."""
     given = sky(radiance=noise(16), has_cells=has_cells, turn=TURN)
     lights = written(given, tmp_path, up)
-    for backwards in np.concatenate([np.eye(3), -np.eye(3)]):
-        found = sky_seen(lights, backwards, AXES[up].of, 48).reshape(-1, 3)
+    sides = np.concatenate([np.eye(3), -np.eye(3)])
+    seen = together(lambda backwards: sky_seen(lights, backwards, AXES[up].of, 48), sides)
+    for backwards, shown in zip(sides, seen, strict=True):
+        found = shown.reshape(-1, 3)
         inner = directions_seen(backwards, 48).reshape(-1, 3) @ TURN
         expected = look_up(given.radiance, inner, has_cells)
         _, v = sphere.to_image(inner)
@@ -94,11 +96,12 @@ def test_a_sun_gives_its_irradiance(tmp_path, up, diameter):
     given = sun(diameter)
     lights = written(sky(given), tmp_path, up)
     assert ("area_light" in lights.read_text()) is bool(diameter)
-    for normal in (given.to_light, unit((0, 0, 1)), unit((1, 0, 0))):
-        found = plate(lights, normal, AXES[up].of, ALONE)
+    normals = (given.to_light, unit((0, 0, 1)), unit((1, 0, 0)), -given.to_light)
+    *lit, dark = together(lambda normal: plate(lights, normal, AXES[up].of, ALONE), normals)
+    for normal, found in zip(normals[:-1], lit, strict=True):
         expected = ALBEDO / np.pi * given.irradiance * (normal @ given.to_light)
         assert found == pytest.approx(np.broadcast_to(expected, found.shape), rel=HALVES)
-    assert plate(lights, -given.to_light, AXES[up].of, ALONE).max() == 0
+    assert dark.max() == 0
 
 
 @pytest.mark.parametrize("diameter", [40, 179])
@@ -149,27 +152,27 @@ def test_a_disc_s_shadow_fades_as_it_should(tmp_path):
 
 
 @pytest.mark.parametrize("normal", ORIENTATIONS.values(), ids=ORIENTATIONS.keys())
-@pytest.mark.parametrize("up", ["usual", "z"])
-def test_a_plate_gets_what_is_exported(tmp_path, normal, up):
+def test_a_plate_gets_what_is_exported(tmp_path, normal):
     """By lights and radiosity together, a wide sun in the map among them."""
     radiance = noise(32) * np.array([1, 0.5, 0.2], np.float32)
     suns = [sun(0.5, flux=(1.0, 0.5, 0.2)), sun(30, (0.0, -0.6, 0.8), (2.0, 1.0, 0.5))]
     normal = unit(normal)
     given = sky(*suns, radiance=radiance, turn=TURN)
-    found = plate(written(given, tmp_path, up), normal, AXES[up].of)
+    lights = {up: written(given, tmp_path / up, up) for up in ("usual", "z")}
     wide = with_suns(radiance, suns[1:], TURN, False)
     expected = irradiance_by(wide, TURN.T @ normal)
     expected += suns[0].irradiance * max(normal @ suns[0].to_light, 0)
-    print(found.mean((0, 1)) / (ALBEDO / np.pi * expected) - 1)
-    assert found.mean((0, 1)) == pytest.approx(ALBEDO / np.pi * expected, rel=0.005)
+    for found in together(lambda up: plate(lights[up], normal, AXES[up].of), lights):
+        print(found.mean((0, 1)) / (ALBEDO / np.pi * expected) - 1)
+        assert found.mean((0, 1)) == pytest.approx(ALBEDO / np.pi * expected, rel=0.005)
 
 
 def test_both_axes_show_the_same_scene(tmp_path):
     given = sky(sun(0.5, (0.48, 0.36, 0.8)), radiance=sunny(64, 20.0), turn=TURN)
-    found = []
     for up in ("usual", "z"):
         export_conversion(given, tmp_path / up, ExportSettings("povray", up))
-        found.append(picture(tmp_path / up / "sky.scene.pov", 96, 54))
+    scenes = [tmp_path / up / "sky.scene.pov" for up in ("usual", "z")]
+    found = together(lambda scene: picture(scene, 96, 54), scenes)
     # Radiosity gathers along other directions where axes are others.
     assert found[1].mean((0, 1)) == pytest.approx(found[0].mean((0, 1)), rel=0.003)
     far = np.abs(found[1] - found[0]).max(axis=-1) > 0.1 * found[0].mean()

@@ -21,8 +21,8 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, field
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +63,8 @@ class Window:
     folder: Path
     display: str
     process: subprocess.Popen
+    found: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """Where buttons were found last: looked at first."""
 
     # Inside
 
@@ -203,12 +205,14 @@ class Window:
 
     def find(self, name: str) -> tuple[int, int]:
         """Where the sidebar has the button of an operator or property, as `sunsplit.convert`."""
-        for x, y in self._rows():
+        known = [self.found[name]] if name in self.found else []
+        for x, y in chain(known, self._rows()):
             self.move(x, y)
             self.settle()
             if self.ask("hovered()") == name:
                 self.settle()  # the mouse may have been seen at the row before
                 if self.ask("hovered()") == name:
+                    self.found[name] = x, y
                     return x, y
         raise NotSeen(f"No button {name} in the sidebar.")
 

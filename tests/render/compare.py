@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from tests.blender import render
+from tests.blender import renders
 
 MEAN = 0.003
 """Relative difference of the means of each channel that a conversion may make (issue: 0.3 %)."""
@@ -29,12 +29,12 @@ class Estimate:
 
 def estimate(scene, folder: Path, samples: int, seeds: int = 4) -> Estimate:
     """Render with several seeds, so that the renders themselves say how noisy they are."""
-    return estimate_of([render(scene, folder, samples, seed) for seed in range(seeds)])
+    return estimate_of(renders(scene, folder, samples, seeds))
 
 
-def estimate_of(renders: Sequence[np.ndarray]) -> Estimate:
+def estimate_of(pictures: Sequence[np.ndarray]) -> Estimate:
     """Of at least two renders, (height, width, 3) each, by different seeds."""
-    images, seeds = np.stack(renders), len(renders)
+    images, seeds = np.stack(pictures), len(pictures)
     error = images.std(axis=0, ddof=1) / np.sqrt(seeds)
     return Estimate(images.mean(axis=0), error, images.mean(axis=(1, 2)))
 

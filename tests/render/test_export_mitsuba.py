@@ -7,7 +7,7 @@ import pytest
 
 from sunsplit.core import ExportSettings, export_conversion, mitsuba_dict, read_skylight
 from sunsplit.core.export.axes import Y_UP, Z_UP
-from tests.exporting import MEAN, converted, exported, reference, shadows_agree
+from tests.exporting import MEAN, exported, shadows_agree
 from tests.mitsuba_renders import picture, plate, renderer
 from tests.plates import ALBEDO, ORIENTATIONS, irradiance, unit
 from tests.render.compare import estimate_of, means_agree, pixels_agree
@@ -18,26 +18,13 @@ def mitsuba():
     return renderer()
 
 
-@pytest.fixture(scope="module")
-def wanted(sunrise, tmp_path_factory):
-    return reference(sunrise, tmp_path_factory.mktemp("reference"))
-
-
-@pytest.fixture(scope="module")
-def lights(sunrise, tmp_path_factory):
-    """A conversion whose plates are right within a tenth of what is asked here, as tests of the
-    split show."""
-    return converted(sunrise, tmp_path_factory.mktemp("conversion"), "--tolerance", "0.4")
-
-
 @pytest.mark.parametrize(
     "options",
     [(), ("--up", "z"), ("--discs", "map"), ("--discs", "lights")],
     ids=["usual", "z up", "all suns in the map", "all suns as lights"],
 )
-def test_the_scene_that_comes_with_it(tmp_path, sunrise, wanted, options):
-    lights = converted(sunrise, tmp_path)
-    folder = exported(lights, tmp_path / "mitsuba", "mitsuba", *options)
+def test_the_scene_that_comes_with_it(tmp_path, sunrise, usual_lights, wanted, options):
+    folder = exported(usual_lights, tmp_path, "mitsuba", *options)
     scene = folder / f"{sunrise.stem}.scene.xml"
     height, width = wanted.ground.shape
     found = estimate_of([picture(scene, width, height, 48, seed) for seed in range(4)])
@@ -46,11 +33,18 @@ def test_the_scene_that_comes_with_it(tmp_path, sunrise, wanted, options):
     shadows_agree(wanted, found.mean)
 
 
+@pytest.fixture(scope="module")
+def by_axis(lights, tmp_path_factory):
+    """Exports of one conversion: a folder for each axis that is up."""
+    folder = tmp_path_factory.mktemp("exports")
+    return {up: exported(lights, folder / up, "mitsuba", "--up", up) for up in ("usual", "z")}
+
+
 @pytest.mark.parametrize("normal", ORIENTATIONS.values(), ids=ORIENTATIONS.keys())
-def test_a_white_plate(tmp_path, sunrise, lights, normal):
+def test_a_white_plate(sunrise, by_axis, normal):
     normal = unit(normal)
     for up, axes in (("usual", Y_UP), ("z", Z_UP)):
-        folder = exported(lights, tmp_path / up, "mitsuba", "--up", up)
+        folder = by_axis[up]
         found = plate(folder / f"{sunrise.stem}.lights.xml", normal, axes.of, 400, 1)
         expected = ALBEDO / np.pi * irradiance(sunrise, normal)
         print(f"{up}: ratio - 1 {found.mean((0, 1)) / expected - 1}")

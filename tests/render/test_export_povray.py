@@ -8,9 +8,9 @@ import pytest
 from sunsplit.core import ExportSettings, export_conversion, read_skylight
 from sunsplit.core.export.axes import Y_UP_LEFT, Z_UP
 from tests.core.test_export_povray import TURN
-from tests.exporting import MEAN, converted, exported, reference, shadows_agree
+from tests.exporting import MEAN, exported, shadows_agree
 from tests.plates import ALBEDO, ORIENTATIONS, irradiance, unit
-from tests.povray_renders import picture, plate, renderer
+from tests.povray_renders import picture, plate, renderer, together
 from tests.render.compare import estimate_of, means_agree, pixels_agree
 
 SMOOTH = ["+A0.05", "+R3", "-J"]
@@ -22,25 +22,13 @@ def povray():
     return renderer()
 
 
-@pytest.fixture(scope="module")
-def wanted(sunrise, tmp_path_factory):
-    return reference(sunrise, tmp_path_factory.mktemp("reference"))
-
-
-@pytest.fixture(scope="module")
-def lights(sunrise, tmp_path_factory):
-    """A conversion whose plates are right within a tenth of what is asked here."""
-    return converted(sunrise, tmp_path_factory.mktemp("conversion"), "--tolerance", "0.4")
-
-
 @pytest.mark.parametrize(
     "options",
     [(), ("--up", "z"), ("--discs", "lights")],
     ids=["usual", "z up", "all suns as lights"],
 )
-def test_the_scene_that_comes_with_it(tmp_path, sunrise, wanted, options):
-    lights = converted(sunrise, tmp_path)
-    folder = exported(lights, tmp_path / "povray", "povray", *options)
+def test_the_scene_that_comes_with_it(tmp_path, sunrise, usual_lights, wanted, options):
+    folder = exported(usual_lights, tmp_path, "povray", *options)
     height, width = wanted.ground.shape
     found = picture(folder / f"{sunrise.stem}.scene.pov", width, height, *SMOOTH)
     # It has no noise to speak of that another seed would change.
@@ -50,13 +38,23 @@ def test_the_scene_that_comes_with_it(tmp_path, sunrise, wanted, options):
     shadows_agree(wanted, found.mean)
 
 
+@pytest.fixture(scope="module")
+def by_axis(lights, tmp_path_factory):
+    """Exports of one conversion: a folder for each axis that is up."""
+    folder = tmp_path_factory.mktemp("exports")
+    return {up: exported(lights, folder / up, "povray", "--up", up) for up in ("usual", "z")}
+
+
 @pytest.mark.parametrize("normal", ORIENTATIONS.values(), ids=ORIENTATIONS.keys())
-def test_a_white_plate(tmp_path, sunrise, lights, normal):
+def test_a_white_plate(sunrise, by_axis, normal):
     normal = unit(normal)
-    for up, axes in (("usual", Y_UP_LEFT), ("z", Z_UP)):
-        folder = exported(lights, tmp_path / up, "povray", "--up", up)
-        found = plate(folder / f"{sunrise.stem}.lights.inc", normal, axes.of)
-        expected = ALBEDO / np.pi * irradiance(sunrise, normal)
+    expected = ALBEDO / np.pi * irradiance(sunrise, normal)
+    axes = {"usual": Y_UP_LEFT.of, "z": Z_UP.of}
+
+    def seen(up):
+        return plate(by_axis[up] / f"{sunrise.stem}.lights.inc", normal, axes[up])
+
+    for up, found in zip(axes, together(seen, axes), strict=True):
         print(f"{up}: ratio - 1 {found.mean((0, 1)) / expected - 1}")
         assert found.mean((0, 1)) == pytest.approx(expected, rel=MEAN)
 

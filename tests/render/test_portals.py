@@ -22,7 +22,7 @@ def overcast(tmp_path_factory):
 
 def test_the_light_is_that_of_the_map_and_the_noise_far_less(overcast, tmp_path):
     scene = room(overcast, size=24)
-    plain = estimate(scene, tmp_path, samples=2048)
+    plain = estimate(scene, tmp_path, samples=1024)
     bpy.ops.sunsplit.convert()
     (portal,) = portals(scene)
     told = estimate(scene, tmp_path, samples=512)
