@@ -15,8 +15,11 @@ from .views import is_ordinary
 SOLID = {"MESH", "EMPTY", "LIGHT", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE"}
 """Objects that rays meet, or renders do not show."""
 
-RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
-"""What something may be hidden from."""
+VISIBLE = tuple(
+    f"visible_{ray}"
+    for ray in ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
+)
+"""What tells of each kind of ray that something is not hidden from it."""
 
 
 def shown_things(things: Iterable[bpy.types.Object]) -> Iterator[bpy.types.Object]:
@@ -82,4 +85,4 @@ def _are_instances_met(
 def _makes_what_is_seen(maker: bpy.types.Object) -> bool:
     if maker.instance_type != "COLLECTION" or not maker.instance_collection:
         return False
-    return all(getattr(maker, f"visible_{ray}") for ray in RAYS)
+    return all(getattr(maker, name) for name in VISIBLE)

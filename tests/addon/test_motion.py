@@ -422,24 +422,24 @@ def test_fewer_frames_are_read_where_each_is_more_work(scene, monkeypatch):
     scene.frame_end = 200
     open_door(scene, (1, 200))
     door = scene.objects["Door"]
-    assert len(read_frames(scene, [scene.camera], [door])) == 200
+    assert len(run_at_once(read_frames(scene, [scene.camera], [door]))) == 200
     monkeypatch.setattr(frames, "MOST_WORK", 3 * 50)
-    assert 40 < len(read_frames(scene, [scene.camera], [door])) <= 50
+    assert 40 < len(run_at_once(read_frames(scene, [scene.camera], [door]))) <= 50
     scene.frame_set(7)
-    assert 7 in [one.frame for one in read_frames(scene, [scene.camera], [door])]
+    assert 7 in [one.frame for one in run_at_once(read_frames(scene, [scene.camera], [door]))]
     hang_on_a_bone_that_follows(scene)
-    fewer = len(read_frames(scene, [scene.camera], [door]))
+    fewer = len(run_at_once(read_frames(scene, [scene.camera], [door])))
     assert 2 < fewer < 40
     ball = bpy.data.objects.new("Ball", ball_mesh(0.1))
     scene.collection.objects.link(ball)
     ball.modifiers.new("Wave", "WAVE")
     door.parent, door.parent_type = ball, "VERTEX"
     bpy.context.view_layer.update()
-    assert read_frames(scene, [scene.camera], [door]) is None
+    assert run_at_once(read_frames(scene, [scene.camera], [door])) is None
     monkeypatch.setattr(frames, "MOST_WORK", 1e6)
-    assert read_frames(scene, [scene.camera], [door])
+    assert run_at_once(read_frames(scene, [scene.camera], [door]))
     monkeypatch.setattr(frames, "MOST_THINGS", 1)
-    assert read_frames(scene, [scene.camera], [door]) is None
+    assert run_at_once(read_frames(scene, [scene.camera], [door])) is None
 
 
 def test_what_is_shown_outside_of_the_range_is_not_rendered(scene):
@@ -454,11 +454,11 @@ def test_what_is_shown_outside_of_the_range_is_not_rendered(scene):
 def test_only_markers_that_choose_a_camera_are_cuts(scene):
     scene.frame_end = 5000
     turn_camera(scene, (90, 100))
-    before = [one.frame for one in read_frames(scene, [scene.camera], [])]
+    before = [one.frame for one in run_at_once(read_frames(scene, [scene.camera], []))]
     scene.timeline_markers.new("Note", frame=1234)
-    assert [one.frame for one in read_frames(scene, [scene.camera], [])] == before
+    assert [one.frame for one in run_at_once(read_frames(scene, [scene.camera], []))] == before
     scene.timeline_markers.new("Cut", frame=1234).camera = scene.camera
-    after = [one.frame for one in read_frames(scene, [scene.camera], [])]
+    after = [one.frame for one in run_at_once(read_frames(scene, [scene.camera], []))]
     assert sorted({*before, 1233, 1234}) == after
 
 
@@ -473,7 +473,7 @@ def test_the_camera_that_blender_chooses(scene, hidden):
         cameras[-1].hide_render = x in hidden
     scene.camera = first
     bpy.context.view_layer.update()
-    read = {one.frame: one.view.place for one in read_frames(scene, cameras, [])}
+    read = {one.frame: one.view.place for one in run_at_once(read_frames(scene, cameras, []))}
     for frame in (1, 9, 10, 11, 20, 100):
         scene.frame_set(frame)
         assert read[frame] == scene.camera.location
