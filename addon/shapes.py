@@ -201,8 +201,8 @@ def _met(
     coordinates of each, (2, 3, n). place: the ray's start, (3, 1). slope: one over its direction,
     (3, 1)."""
     one, other = (boxes - place) * slope
-    enters = np.minimum(one, other).max(axis=0)
-    leaves = np.maximum(one, other).min(axis=0)
+    enters = np.maximum.reduce(np.minimum(one, other))
+    leaves = np.minimum.reduce(np.maximum(one, other))
     met = ((enters <= leaves) & (leaves >= 0)).nonzero()[0]
     if not len(met):
         return []

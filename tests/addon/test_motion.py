@@ -13,6 +13,7 @@ from mathutils import Matrix, Vector
 
 from sunsplit.addon import changes, frames
 from sunsplit.addon.frames import read_frames
+from sunsplit.addon.keyed import keyed_camera
 from sunsplit.addon.moments import FEWEST, MOST
 from sunsplit.addon.motion import moving
 from sunsplit.addon.rays import Reach
@@ -710,3 +711,80 @@ def test_a_thing_that_turns_under_an_open_sky_costs_little(scene):
     bpy.ops.sunsplit.convert()
     assert [to_light(lamp) @ TO_DOOR for lamp in suns(scene)] == pytest.approx([1], abs=1e-3)
     assert "reaches nothing that the camera shows" in scene.sunsplit.report
+
+
+@pytest.mark.parametrize("mode", ["XYZ", "ZYX", "QUATERNION"])
+def test_keys_alone_tell_where_a_camera_is(scene, mode):
+    """As evaluating the scene does, in every frame."""
+    camera = scene.camera
+    camera.rotation_mode, camera.scale = mode, (1, 2, -0.5)
+    turned = "rotation_quaternion" if mode == "QUATERNION" else "rotation_euler"
+    for frame, by in ((1, 0.0), (40, 1.0), (250, -0.7)):
+        camera.location[1] += by
+        getattr(camera, turned)[2] += by
+        camera.keyframe_insert("location", index=1, frame=frame)
+        camera.keyframe_insert(turned, frame=frame)
+    assert keyed_camera(camera)
+    by_keys = run_at_once(read_frames(scene, [camera], []))
+    evaluated = run_at_once(read_frames(scene, [camera], [scene.objects["Door"]]))
+    assert [one.frame for one in by_keys] == [one.frame for one in evaluated]
+    assert len({one.view.place[1] for one in by_keys}) > 10
+    for one, other in zip(by_keys, evaluated, strict=True):
+        assert np.allclose(one.view.place, other.view.place, atol=1e-6)
+        assert np.allclose(one.view.turn, other.view.turn, atol=1e-6)
+        assert one.view.corners == other.view.corners
+
+
+def _hang_on_a_parent(camera):
+    camera.parent = bpy.data.objects["Door"]
+
+
+def _drive(camera):
+    camera.driver_add("location", 0).driver.expression = "frame"
+
+
+def _zoom(camera):
+    camera.data.keyframe_insert("lens", frame=1)
+
+
+def _mute(camera):
+    made = camera.animation_data
+    bag = made.action.layers[0].strips[0].channelbag(made.action_slot)
+    bag.fcurves[0].mute = True
+
+
+def _shift(camera):
+    camera.delta_location[0] = 1
+
+
+def _aim(camera):
+    camera.constraints.new("TRACK_TO")
+
+
+@pytest.mark.parametrize("change", [_hang_on_a_parent, _drive, _zoom, _mute, _shift, _aim])
+def test_more_than_keys_must_be_evaluated(scene, change):
+    turn_camera(scene, (90, 100))
+    assert keyed_camera(scene.camera)
+    change(scene.camera)
+    assert keyed_camera(scene.camera) is None
+
+
+def test_the_window_has_moments_while_frames_are_read(scene, monkeypatch):
+    monkeypatch.setattr(frames, "LEAST_AT_ONCE", 50)
+    open_door(scene, (1, 250))
+    scenes = len(bpy.data.scenes)
+    steps = read_frames(scene, [scene.camera], [scene.objects["Door"]])
+    moments, readings = 0, None
+    while readings is None:
+        try:
+            assert next(steps) is None
+        except StopIteration as done:
+            readings = done.value
+        else:
+            moments += 1
+            assert len(bpy.data.scenes) == scenes  # nothing is left that the user could see
+    monkeypatch.setattr(frames, "LEAST_AT_ONCE", 1e9)
+    at_once = run_at_once(read_frames(scene, [scene.camera], [scene.objects["Door"]]))
+    assert moments > 2
+    for one, other in zip(readings, at_once, strict=True):
+        assert (one.frame, one.places) == (other.frame, other.places)
