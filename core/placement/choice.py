@@ -136,7 +136,7 @@ def _patches(light: RegionLight, strata: Strata, most: int) -> Patches:
         most = MOST_PATCHES  # all of them are pixels
     return light.once(
         ("patches", strata, most),
-        lambda: patches_of(light, strata.luminance.ravel()[light.pixels], most),
+        lambda: patches_of(light, strata.luminance.ravel()[light.pixels], most, strata),
     )
 
 
