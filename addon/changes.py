@@ -39,7 +39,13 @@ Fact = tuple[bpy.types.Object, str]
 
 def changes_of(things: Iterable[bpy.types.Object]) -> set[Fact]:
     """What of some things, and of all that they follow, may be otherwise in another frame."""
-    waiting = [(thing, what) for thing in things for what in (PLACE, SHAPE)]
+    plain_data: dict[bpy.types.ID | None, bool] = {}
+    waiting = [
+        (thing, what)
+        for thing in things
+        if not _is_plain(thing, plain_data)
+        for what in (PLACE, SHAPE)
+    ]
     known: set[Fact] = set()
     followers: dict[Fact, list[Fact]] = defaultdict(list)
     while waiting:
@@ -58,6 +64,20 @@ def changes_of(things: Iterable[bpy.types.Object]) -> set[Fact]:
             changed.add(fact)
             waiting += followers[fact]
     return changed
+
+
+def _is_plain(thing: bpy.types.Object, plain_data: dict[bpy.types.ID | None, bool]) -> bool:
+    """Whether nothing of it can change, nor follow what does: most of a scene is so, and soon told.
+    plain_data: what is known of things' data, which many may share."""
+    if thing.parent or thing.animation_data or thing.rigid_body or thing.pose:
+        return False
+    if len(thing.modifiers) or len(thing.constraints) or len(thing.particle_systems):
+        return False
+    data = thing.data
+    if data not in plain_data:
+        keys = getattr(data, "shape_keys", None)
+        plain_data[data] = not (getattr(data, "animation_data", None) or keys)
+    return plain_data[data]
 
 
 def is_animated(owner: bpy.types.ID | None) -> bool:

@@ -1,13 +1,14 @@
 """Where things are in other frames, without going there.
 
-A scratch scene of its own, with what moves in it, is evaluated instead: the user's scene keeps its
-frame, what was moved and not keyed stays, and no handler of any add-on hears of it. It is gone
-before the next step, so neither the window nor undo ever see it.
+Cameras that only keys move are where these say. For all else a scratch scene of its own, with what
+moves in it, is evaluated: the user's scene keeps its frame, what was moved and not keyed stays, and
+no handler of any add-on hears of it. It is gone before the next step, so neither the window nor
+undo ever see it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -16,8 +17,10 @@ import numpy as np
 from mathutils import Matrix
 
 from .changes import SHAPE, changes_of
+from .keyed import KeyedCamera, keyed_camera
 from .motion import cuts_of
 from .shapes import Key, key_of
+from .steps import Steps
 from .views import View, is_ordinary, view_of
 
 MOST_FRAMES = 250
@@ -35,6 +38,16 @@ MOST_WORK = 60_000
 
 BONE, POINT = 0.3, 0.03
 """What a bone, and a point of a mesh that is bent anew in each frame, take of that."""
+
+BEGIN, TOLD_AGAIN = 25, 10
+"""What a thing that moves takes when it is evaluated for the first time, and each object of the
+user's scene when another scene has come and gone: so many times as much."""
+
+LEAST_AT_ONCE = 10_000
+"""A tenth of a second: more moments for the window would not make it livelier."""
+
+AT_A_TIME = 32
+"""Frames by keys alone between two moments for the window."""
 
 HANDLERS = (
     "frame_change_pre",
@@ -57,28 +70,61 @@ def read_frames(
     scene: bpy.types.Scene,
     cameras: Iterable[bpy.types.Object],
     moving: Iterable[bpy.types.Object],
-) -> list[Reading] | None:
+) -> Steps[list[Reading] | None]:
     """Frames of a scene's range, first and last among them, and the one that it shows if it is of
     the range; None: that is too much work, or the camera does not stay an ordinary one."""
+    cameras = list(cameras)
     things = {*cameras, *moving}
     if len(things) > MOST_THINGS:
         return None
+    keyed = [keyed_camera(camera) for camera in cameras]
+    if len(things) == len(cameras) and all(keyed):
+        return (yield from _by_keys(scene, {one.camera: one for one in keyed}))
+    return (yield from _evaluated(scene, things))
+
+
+def _by_keys(
+    scene: bpy.types.Scene, keyed: Mapping[bpy.types.Object, KeyedCamera]
+) -> Steps[list[Reading] | None]:
+    """Where nothing moves but cameras, each by its own keys."""
+    found = []
+    first = scene.frame_start
+    for number, frame in enumerate([first, *_frames_after_first(scene, 0, len(keyed))]):
+        camera = _camera_at(scene, frame)
+        matrix = keyed[camera].matrix_at(frame)
+        if not is_ordinary(camera) or matrix.determinant() == 0:
+            return None
+        found.append(Reading(frame, view_of(scene, camera, matrix), {}))
+        if number % AT_A_TIME == 0:
+            yield
+    return sorted(found, key=lambda reading: reading.frame)
+
+
+def _evaluated(
+    scene: bpy.types.Scene, things: set[bpy.types.Object]
+) -> Steps[list[Reading] | None]:
+    """Whatever moves. The window has a moment whenever as long was read as it takes to begin."""
     found: list[Reading] = []
-    with _scratch(scene, things) as (scratch, graph):
-        frames = [scene.frame_start]
-        while frames:
-            frame = frames.pop(0)
-            scratch.frame_current = frame
-            graph.update()
-            camera = _camera_at(scene, frame).evaluated_get(graph)
-            if not is_ordinary(camera):
-                return None
-            found.append(Reading(frame, view_of(scene, camera), _places(graph)))
-            if len(found) == 1:
-                work = _work(graph) + len(found[0].places)
-                frames = _frames_after_first(scene, len(found[0].places), work)
-                if (1 + len(frames)) * work > MOST_WORK:
+    frames, work = [scene.frame_start], 0.0
+    begin = BEGIN * len(things) + TOLD_AGAIN * len(scene.objects)
+    while frames:
+        with _scratch(scene, things) as (scratch, graph):
+            done = 0.0
+            while frames and done <= max(begin, LEAST_AT_ONCE):
+                frame = frames.pop(0)
+                scratch.frame_current = frame
+                graph.update()
+                camera = _camera_at(scene, frame).evaluated_get(graph)
+                if not is_ordinary(camera):
                     return None
+                found.append(Reading(frame, view_of(scene, camera), _places(graph)))
+                if len(found) == 1:
+                    work = _work(graph) + len(found[0].places)
+                    frames = _frames_after_first(scene, len(found[0].places), work)
+                    if (1 + len(frames)) * work > MOST_WORK:
+                        return None
+                done += work
+        yield
     return sorted(found, key=lambda reading: reading.frame)
 
 

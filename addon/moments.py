@@ -14,7 +14,17 @@ from numpy.typing import NDArray
 from ..core.visible import NEAR
 from .frames import Reading, read_frames
 from .motion import cameras_of, is_still, moving
-from .shapes import Crowd, Hit, Key, Shape, WholeScene, are_flattened, shapes_of, whole_scene
+from .shapes import (
+    Crowd,
+    Hit,
+    Key,
+    Shape,
+    WholeScene,
+    are_flattened,
+    corners_of,
+    shapes_of,
+    whole_scene,
+)
 from .steps import Steps
 from .views import View, view_of
 
@@ -164,7 +174,7 @@ class Sight:
 
 def sight_of(
     scene: bpy.types.Scene, shown: Iterable[bpy.types.Object], panes: Panes
-) -> Sight | None:
+) -> Steps[Sight | None]:
     """An ordinary scene for rays; None: looking at a few frames does not tell what all show."""
     shown = list(shown)
     moved = moving(scene, shown)
@@ -179,7 +189,8 @@ def sight_of(
         everything = tuple(shapes.values())
         whole = whole_scene(scene, graph, everything) or Crowd(everything)
         return Sight((Moment(0, view, (whole,), panes),), (view,), everything)
-    return _sight_in_motion(scene, shapes, moved, panes)
+    yield
+    return (yield from _sight_in_motion(scene, shapes, moved, panes))
 
 
 def _sight_in_motion(
@@ -187,26 +198,26 @@ def _sight_in_motion(
     shapes: Mapping[Key, Shape],
     moved: frozenset[bpy.types.Object],
     panes: Panes,
-) -> Sight | None:
+) -> Steps[Sight | None]:
     movers = _movers(scene, shapes, moved)
     makers = {thing for shape in movers.values() for thing in shape.things}
-    readings = read_frames(scene, cameras_of(scene), makers)
+    readings = yield from read_frames(scene, cameras_of(scene), makers)
     if readings is None or any(not movers.keys() <= one.places.keys() for one in readings):
         return None
     still = Crowd(shape for key, shape in shapes.items() if key not in movers)
     choice = _Choice(readings, movers, still)
-    chosen = choice.frames()
+    chosen = yield from choice.frames()
     if chosen is None:
         return None
-    moments = tuple(
-        Moment(number, readings[k].view, (still, choice.crowd(k)), panes)
-        for number, k in enumerate(chosen)
-    )
+    moments = []
+    for number, k in enumerate(chosen):
+        moments.append(Moment(number, readings[k].view, (still, choice.crowd(k)), panes))
+        yield
     if are_flattened(shape for moment in moments for shape in moment.crowds[1].shapes):
         return None
     views = tuple(reading.view for reading in readings)
     frames = scene.frame_start, scene.frame_end
-    return Sight(moments, views, tuple(shapes.values()), frames)
+    return Sight(tuple(moments), views, tuple(shapes.values()), frames)
 
 
 def _movers(
@@ -230,7 +241,7 @@ class _Choice:
     movers: Mapping[Key, Shape]
     still: Crowd
 
-    def frames(self) -> list[int] | None:
+    def frames(self) -> Steps[list[int] | None]:
         """Their numbers; None: too many, or what moves is too quick for those that were read."""
         last = len(self.readings) - 1
         stride = -(-last // (FEWEST - 1))
@@ -248,6 +259,7 @@ class _Choice:
             chosen.append(end)
             if len(chosen) > MOST:
                 return None
+            yield
         return chosen
 
     def crowd(self, number: int) -> Crowd:
@@ -277,7 +289,7 @@ class _Choice:
 
 def _corners(crowd: Crowd) -> NDArray[np.float64]:
     """Of the boxes of shapes, (n, 8, 3)."""
-    return np.array([shape.corners for shape in crowd.shapes]).reshape(-1, 8, 3)
+    return corners_of(crowd.shapes)
 
 
 def _depth(view: View, crowds: Iterable[Crowd]) -> float:

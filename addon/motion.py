@@ -32,9 +32,8 @@ def moving(
     """Those objects that move: of what is shown and of the scene's cameras. None: single frames
     would not tell how."""
     shown, cameras = list(shown), cameras_of(scene)
-    members = (
-        thing.instance_collection.all_objects for thing in shown if thing.instance_collection
-    )
+    instanced = {thing.instance_collection for thing in shown} - {None}
+    members = (made.all_objects for made in instanced)
     if any(_appears(thing) for thing in {*scene.objects, *chain.from_iterable(members)}):
         return None
     changed = changes_of({*shown, *cameras})
@@ -65,6 +64,8 @@ def cuts_of(scene: bpy.types.Scene) -> list[bpy.types.TimelineMarker]:
 
 
 def _appears(thing: bpy.types.Object) -> bool:
+    if not thing.animation_data:  # most have none
+        return False
     return any(path.startswith("hide") for path in animated_paths(thing))
 
 
@@ -80,13 +81,10 @@ def _is_untold(
         return True
     if any(camera.type != "CAMERA" or camera.hide_viewport for camera in cameras):
         return True
-    things = [*scene.objects, *shown]
-    owners = {
-        part
-        for thing in things
-        for part in (thing, thing.data, getattr(thing.data, "shape_keys", None))
-    }
-    if any(_runs_script(owner) for owner in owners if owner):
+    things = {*scene.objects, *shown}
+    data = {thing.data for thing in things} - {None}
+    keys = {getattr(one, "shape_keys", None) for one in data} - {None}
+    if any(map(_runs_script, (*things, *data, *keys))):
         return True
     bones = [bone for thing in things if thing.pose for bone in thing.pose.bones]
     if any(part.type in FROM_ELSEWHERE for one in (*things, *bones) for part in one.constraints):
@@ -99,7 +97,9 @@ def _is_untold(
 def _runs_script(owner: bpy.types.ID) -> bool:
     """Whether drivers do, or look at what belongs to the scene that is shown."""
     made = getattr(owner, "animation_data", None)
-    drivers = [curve.driver for curve in made.drivers] if made else []
+    if not made:
+        return False
+    drivers = [curve.driver for curve in made.drivers]
     if any(d.type == "SCRIPTED" and not d.is_simple_expression for d in drivers):
         return True
     return any(

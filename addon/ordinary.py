@@ -4,6 +4,7 @@ show."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from operator import attrgetter
 
 import bpy
 
@@ -18,14 +19,22 @@ SOLID = {"MESH", "EMPTY", "LIGHT", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "
 RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 """What something may be hidden from."""
 
+_is_visible = attrgetter(*(f"visible_{ray}" for ray in RAYS))
 
-def shown_things(things: Iterable[bpy.types.Object]) -> Iterator[bpy.types.Object]:
-    """Things that renders may show, and those in collections that they are instances of."""
+
+def shown_things(
+    things: Iterable[bpy.types.Object], known: set[bpy.types.Collection] | None = None
+) -> Iterator[bpy.types.Object]:
+    """Things that renders may show, and those in collections that they are instances of: of each
+    collection once. known: collections that are not asked for any more."""
+    known = set() if known is None else known
     for thing in things:
         if not thing.hide_render:
             yield thing
-            if thing.instance_collection:
-                yield from shown_things(thing.instance_collection.all_objects)
+            made = thing.instance_collection
+            if made and made not in known:
+                known.add(made)
+                yield from shown_things(made.all_objects, known)
 
 
 def is_seen_as_rendered(scene: bpy.types.Scene, shown: Iterable[bpy.types.Object]) -> bool:
@@ -50,12 +59,17 @@ def is_all_met(
     if are_flattened(shapes):
         return False
     makers = [thing for thing in shown if thing.instance_type != "NONE"]
-    return all(
-        thing.type in SOLID
-        and thing.mode != "EDIT"
-        and (thing.type != "MESH" or thing not in own or thing.visible_get())
-        for thing in shown
-    ) and _are_instances_met([maker for maker in makers if maker in own], makers, shapes)
+    return all(_is_met(thing, own) for thing in shown) and _are_instances_met(
+        [maker for maker in makers if maker in own], makers, shapes
+    )
+
+
+def _is_met(thing: bpy.types.Object, own: set[bpy.types.Object]) -> bool:
+    """own: things that are shown by themselves."""
+    kind = thing.type
+    if kind != "MESH":
+        return kind in SOLID and thing.mode != "EDIT"
+    return thing.mode != "EDIT" and (thing not in own or thing.visible_get())
 
 
 def _are_instances_met(
@@ -82,4 +96,4 @@ def _are_instances_met(
 def _makes_what_is_seen(maker: bpy.types.Object) -> bool:
     if maker.instance_type != "COLLECTION" or not maker.instance_collection:
         return False
-    return all(getattr(maker, f"visible_{ray}") for ray in RAYS)
+    return all(_is_visible(maker))

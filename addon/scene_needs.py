@@ -5,7 +5,7 @@ Whatever cannot be told is needed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 import bpy
@@ -79,7 +79,7 @@ def needs_steps(scene: bpy.types.Scene, look: bool = True) -> Steps[SceneNeeds]:
         return replace(ALL, other_lights=lights, fog=fog)
     sight = None
     if is_seen_as_rendered(scene, shown):
-        sight = sight_of(scene, shown, _panes(shown))
+        sight = yield from sight_of(scene, shown, _panes(shown))
     sees_world = yield from _sees_world(scene, nodes, sight)
     return SceneNeeds(
         camera_sees_world=sees_world,
@@ -135,24 +135,36 @@ def _is_told_by_rays(
 
 
 def _panes(shown: Iterable[bpy.types.Object]) -> Panes:
-    panes = [thing for thing in shown if _lets_light_through(thing)]
-    straight = [thing for thing in panes if _is_shadowless(thing)]
-    return Panes(*(frozenset(thing.name for thing in those) for those in (panes, straight)))
+    shown = list(shown)
+    worn = {slot.material for thing in shown for slot in thing.material_slots if slot.material}
+    through = {made for made in worn if _has(made, is_translucent)}
+    straight = {made for made in worn if _has(made, is_seen_through)}
+    panes = [thing for thing in shown if _lets_light_through(thing, through)]
+    shadowless = [thing for thing in panes if _is_shadowless(thing, straight)]
+    return Panes(*(frozenset(thing.name for thing in some) for some in (panes, shadowless)))
 
 
-def _lets_light_through(thing: bpy.types.Object) -> bool:
+def _lets_light_through(thing: bpy.types.Object, through: set[bpy.types.Material]) -> bool:
+    """through: materials that do."""
     if thing.type == "MESH" and not (thing.visible_shadow and thing.visible_diffuse):
         return True
-    trees = [s.material.node_tree for s in thing.material_slots if s.material]
-    return any(is_translucent(node) for tree in trees if tree for node in _nodes(tree))
+    return bool(through) and _wears(thing, through)
 
 
-def _is_shadowless(thing: bpy.types.Object) -> bool:
-    """Whether light passes a thing that lets it through without being bent."""
+def _is_shadowless(thing: bpy.types.Object, straight: set[bpy.types.Material]) -> bool:
+    """Whether light passes a thing that lets it through without being bent. straight: materials
+    that it passes so."""
     if thing.type == "MESH" and not thing.visible_shadow:
         return True
-    trees = [s.material.node_tree for s in thing.material_slots if s.material]
-    return any(is_seen_through(node) for tree in trees if tree for node in _nodes(tree))
+    return bool(straight) and _wears(thing, straight)
+
+
+def _wears(thing: bpy.types.Object, materials: set[bpy.types.Material]) -> bool:
+    return any(slot.material in materials for slot in thing.material_slots)
+
+
+def _has(material: bpy.types.Material, kind: Callable[[bpy.types.Node], bool]) -> bool:
+    return material.node_tree is not None and any(map(kind, _nodes(material.node_tree)))
 
 
 def _trees(scene: bpy.types.Scene, shown: list[bpy.types.Object]) -> list[bpy.types.NodeTree]:

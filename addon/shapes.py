@@ -62,12 +62,6 @@ class Shape:
         return replace(self, matrix=matrix)
 
     @cached_property
-    def corners(self) -> NDArray[np.float64]:
-        """Of its box, (8, 3), in the scene's axes."""
-        matrix = self.matrix
-        return self.box @ np.array(matrix.to_3x3()).T + np.array(matrix.translation)
-
-    @cached_property
     def inward(self) -> tuple[Matrix, Matrix] | None:
         """From the scene's axes to its own, of places and of directions; None: it is flattened to
         nothing."""
@@ -100,11 +94,29 @@ class Hit:
     things: tuple[bpy.types.Object, ...]
 
 
+def corners_of(shapes: Sequence[Shape]) -> NDArray[np.float64]:
+    """Of their boxes, (n, 8, 3), in the scene's axes."""
+    matrices = _matrices(shapes)
+    boxes = np.array([shape.box for shape in shapes]).reshape(-1, 8, 3)
+    return boxes @ matrices[:, :3, :3].transpose(0, 2, 1) + matrices[:, None, :3, 3]
+
+
+def _matrices(shapes: Iterable[Shape]) -> NDArray[np.float64]:
+    """Of each shape, (n, 4, 4)."""
+    return np.array([np.array(shape.matrix) for shape in shapes], np.float64).reshape(-1, 4, 4)
+
+
 def are_flattened(shapes: Iterable[Shape]) -> bool:
     """Whether renders show any of them as a sheet that rays do not meet, or badly: not if nothing
     is left of it."""
-    matrices = [np.array(shape.matrix.to_3x3()) for shape in shapes]
-    sizes = np.linalg.svd(np.array(matrices).reshape(-1, 3, 3), compute_uv=False)
+    axes = _matrices(shapes)[:, :3, :3]
+    size = np.linalg.norm(axes, axis=1)
+    longest = size.max(axis=1, initial=0)
+    # Most are about as long along each axis, at right angles: these are soon told.
+    askew = axes.transpose(0, 2, 1) @ axes - size[:, None] ** 2 * np.eye(3)
+    upright = np.abs(askew).max(axis=(1, 2), initial=0) < 0.01 * longest**2
+    even = upright & (size.min(axis=1, initial=np.inf) > 0.5 * longest)
+    sizes = np.linalg.svd(axes[~even], compute_uv=False)
     return bool(((sizes[:, 1] > LINE * sizes[:, 0]) & (sizes[:, 2] < THIN * sizes[:, 0])).any())
 
 
@@ -115,30 +127,28 @@ class Crowd:
         self.shapes = list(shapes)
         if len(self.shapes) <= FEW:
             return
-        corners = np.stack([shape.corners for shape in self.shapes])
+        corners = corners_of(self.shapes)
         low, high = corners.min(axis=1), corners.max(axis=1)
         margin = WIDER * (np.abs(corners).max(axis=(1, 2)) + 1)[:, None]
         groups = _groups(corners.mean(axis=1))
         self._members = groups
-        self._low = [(low - margin)[group] for group in groups]
-        self._high = [(high + margin)[group] for group in groups]
-        self._lowest = np.stack([box.min(axis=0) for box in self._low])
-        self._highest = np.stack([box.max(axis=0) for box in self._high])
+        boxes = np.stack([(low - margin).T, (high + margin).T])
+        self._boxes = [np.ascontiguousarray(boxes[..., group]) for group in groups]
+        around = [(some[0].min(axis=1), some[1].max(axis=1)) for some in self._boxes]
+        self._around = np.ascontiguousarray(np.moveaxis(around, 0, -1))
 
     def nearest(self, start: Vector, direction: Vector, distance: float = np.inf) -> Hit | None:
         """What a ray meets first, no farther than a distance; direction: a unit vector."""
         if len(self.shapes) <= FEW:
             return _first((shape.hit(start, direction) for shape in self.shapes), distance)
         found = None
-        place = np.array(start)
-        slope = np.array(direction, dtype=np.float64)
-        slope = 1 / np.where(np.abs(slope) < 1e-20, 1e-20, slope)
-        for enters, group in _met(self._lowest, self._highest, place, slope):
+        place = np.array(start, np.float64)[:, None]
+        slope = np.array([[1 / (along if abs(along) >= 1e-20 else 1e-20)] for along in direction])
+        for enters, group in _met(self._around, place, slope):
             if enters > distance:
                 break
-            boxes = _met(self._low[group], self._high[group], place, slope)
             members = self._members[group]
-            for begins, member in boxes:
+            for begins, member in _met(self._boxes[group], place, slope):
                 if begins > distance:
                     break
                 hit = self.shapes[members[member]].hit(start, direction)
@@ -185,17 +195,17 @@ def _first(hits: Iterable[Hit | None], distance: float) -> Hit | None:
 
 
 def _met(
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-    place: NDArray[np.float64],
-    slope: NDArray[np.float64],
+    boxes: NDArray[np.float64], place: NDArray[np.float64], slope: NDArray[np.float64]
 ) -> list[tuple[float, int]]:
-    """Boxes that a ray meets, and where it enters them: in that order. slope: one over the ray's
-    direction."""
-    one, other = (low - place) * slope, (high - place) * slope
-    enters = np.minimum(one, other).max(axis=1)
-    leaves = np.maximum(one, other).min(axis=1)
-    met = np.flatnonzero((enters <= leaves) & (leaves >= 0))
+    """Boxes that a ray meets, and where it enters them: in that order. boxes: least and greatest
+    coordinates of each, (2, 3, n). place: the ray's start, (3, 1). slope: one over its direction,
+    (3, 1)."""
+    one, other = (boxes - place) * slope
+    enters = np.maximum.reduce(np.minimum(one, other))
+    leaves = np.minimum.reduce(np.maximum(one, other))
+    met = ((enters <= leaves) & (leaves >= 0)).nonzero()[0]
+    if not len(met):
+        return []
     return sorted(zip(enters[met].tolist(), met.tolist(), strict=True))
 
 
@@ -221,23 +231,25 @@ def shapes_of(graph: bpy.types.Depsgraph) -> dict[Key, Shape] | None:
     found: dict[Key, Shape] = {}
     made: dict[int, tuple[Callable, Matrix] | None] = {}
     for entry in graph.object_instances:
-        thing = entry.instance_object if entry.is_instance else entry.object
-        shown = entry.object
-        if shown.type != "MESH" and shown.original.type == "MESH":
-            return None
-        if shown.type != "MESH" or not (entry.is_instance or entry.show_self):
+        shown, is_instance = entry.object, entry.is_instance
+        if shown.type != "MESH":
+            if shown.original.type == "MESH":
+                return None
+            continue
+        if not (is_instance or entry.show_self):
             continue
         if len(found) >= MOST_SHAPES:
             return None
         mesh = shown.data
         address = mesh.as_pointer()
+        thing = entry.instance_object if is_instance else shown
         if address not in made:
             made[address] = _caster(thing, mesh, graph)
         if made[address] is None:
             continue
         cast, box = made[address]
-        parent = (entry.parent.original,) if entry.is_instance and entry.parent else ()
-        things = (thing.original, *parent)
+        parent = entry.parent if is_instance else None
+        things = (thing.original, parent.original) if parent else (thing.original,)
         found[key_of(entry)] = Shape(things, cast, entry.matrix_world.copy(), box)
     return found
 

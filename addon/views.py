@@ -40,10 +40,11 @@ def is_ordinary(camera: bpy.types.Object | None) -> bool:
     return camera.matrix_world.determinant() != 0
 
 
-def view_of(scene: bpy.types.Scene, camera: bpy.types.Object) -> View:
-    """Of an ordinary camera as it stands or is evaluated. scene: gives the picture's shape."""
+def view_of(scene: bpy.types.Scene, camera: bpy.types.Object, matrix: Matrix | None = None) -> View:
+    """Of an ordinary camera as it stands or is evaluated. scene: gives the picture's shape. matrix:
+    where it is, if not where it stands."""
     data = camera.data
-    matrix = camera.matrix_world
+    matrix = matrix or camera.matrix_world
     return View(
         matrix.translation.copy(),
         matrix.to_3x3().normalized(),  # its size does not matter, a mirror does

@@ -7,6 +7,7 @@ over the pixels: each keeps its light, its mean direction and how far it spreads
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,19 +55,25 @@ class Patches(Memo):
         return len(self.flux)
 
 
-def patches_of(light: RegionLight, brightness: Floats, most: int = MOST_PATCHES) -> Patches:
+def patches_of(
+    light: RegionLight, brightness: Floats, most: int = MOST_PATCHES, key: Hashable = None
+) -> Patches:
     """Patches of a light: about `most` of them, or its pixels where they are fewer.
 
-    brightness: of each pixel of the light, (p,), at least 0. Only pixels that shine count. Blocks
-    with much light of any colour, squared and times their width, are divided first: by so much a
-    shadow's edge across them could be wrong.
+    brightness: of each pixel of the light, (p,), at least 0. key: tells it from others of the same
+    light, which is then not summed again for another number of patches. Only pixels that shine
+    count. Blocks with much light of any colour, squared and times their width, are divided first:
+    by so much a shadow's edge across them could be wrong.
     """
     lit = light.luminous_flux > 0
     if not lit.all():
         light, brightness = light.part(lit), brightness[lit]
     if len(light.pixels) <= most:
         return _pixels(light, brightness)
-    sums, peaks = _pyramid(light, brightness)
+    if key is None:
+        sums, peaks = _pyramid(light, brightness)
+    else:
+        sums, peaks = light.latest("pyramid", key, lambda: _pyramid(light, brightness))
     badness = [_squared(level) * 2.0**k for k, level in enumerate(sums, start=1)]
     limit = _limit(badness, most)
     found = []

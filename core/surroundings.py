@@ -59,4 +59,6 @@ def _harmonic(
     places = np.concatenate([own, row]), np.concatenate([own, column])
     matrix = csc_array((values, places), shape=(count, count))
     given = np.where(outside[..., None], flat[near], 0).sum(axis=1, dtype=np.float64)
-    return np.maximum(splu(matrix).solve(given), 0)
+    # The matrix is symmetric and needs no pivots: so ordered, it takes less.
+    order = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}}
+    return np.maximum(splu(matrix, diag_pivot_thresh=0.0, **order).solve(given), 0)

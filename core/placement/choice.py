@@ -23,8 +23,9 @@ BALANCED = 1.6
 """What is predicted of lights, about, against what is wrong of their cells when these are cut."""
 
 PER_LIGHT, FEWEST_PATCHES = 128, 2048
-"""Where the number of lights is looked for, they are made of so many patches. With twice as many
-the numbers that come out are the same but for chance."""
+"""Lights are made of so many patches. Where their number is looked for, twice as many give the same
+but for chance. As many as were asked for, 2 to 64 of them for nine maps, are by the geometric mean
+as wrong as of MOST_PATCHES to a hundredth, or up to 4 % less, and up to four times as soon made."""
 
 
 def choose_suns(
@@ -62,7 +63,7 @@ def choose_suns(
         else:
             chosen = fewest(sampled, allowed / 100, settings.most_lights)
     elif allowed is None:
-        chosen = _as_many_as_help(patches, strata, settings, prediction)
+        chosen = _as_many_as_help(light, strata, settings, prediction)
     else:
         chosen = _fewest_by_edge(light, strata, settings, prediction, allowed / 100)
     notes = (*chosen.notes, *_count_note(chosen, light, settings, prediction, allowed))
@@ -70,12 +71,13 @@ def choose_suns(
 
 
 def _as_many_as_help(
-    patches: Patches, strata: Strata, settings: ConversionSettings, prediction: Prediction
+    light: RegionLight, strata: Strata, settings: ConversionSettings, prediction: Prediction
 ) -> ChosenSuns:
     """As many as were asked for. Where cells say that fewer do, as on an even map, half as many may
     do better still: what cells get wrong is added up cell by cell, and what wide discs get wrong
     together can be more than that, or less."""
     count = settings.most_lights
+    patches = _patches(light, strata, _enough_patches(count))
     best = _judged(edge_suns(patches, strata, settings, count), prediction, strata)
     while 1 < len(best.suns) < count:
         count = len(best.suns) // 2 + 1
@@ -134,7 +136,7 @@ def _patches(light: RegionLight, strata: Strata, most: int) -> Patches:
         most = MOST_PATCHES  # all of them are pixels
     return light.once(
         ("patches", strata, most),
-        lambda: patches_of(light, strata.luminance.ravel()[light.pixels], most),
+        lambda: patches_of(light, strata.luminance.ravel()[light.pixels], most, strata),
     )
 
 

@@ -13,6 +13,7 @@ from mathutils import Matrix, Vector
 
 from sunsplit.addon import changes, frames
 from sunsplit.addon.frames import read_frames
+from sunsplit.addon.keyed import keyed_camera
 from sunsplit.addon.moments import FEWEST, MOST
 from sunsplit.addon.motion import moving
 from sunsplit.addon.rays import Reach
@@ -422,24 +423,24 @@ def test_fewer_frames_are_read_where_each_is_more_work(scene, monkeypatch):
     scene.frame_end = 200
     open_door(scene, (1, 200))
     door = scene.objects["Door"]
-    assert len(read_frames(scene, [scene.camera], [door])) == 200
+    assert len(run_at_once(read_frames(scene, [scene.camera], [door]))) == 200
     monkeypatch.setattr(frames, "MOST_WORK", 3 * 50)
-    assert 40 < len(read_frames(scene, [scene.camera], [door])) <= 50
+    assert 40 < len(run_at_once(read_frames(scene, [scene.camera], [door]))) <= 50
     scene.frame_set(7)
-    assert 7 in [one.frame for one in read_frames(scene, [scene.camera], [door])]
+    assert 7 in [one.frame for one in run_at_once(read_frames(scene, [scene.camera], [door]))]
     hang_on_a_bone_that_follows(scene)
-    fewer = len(read_frames(scene, [scene.camera], [door]))
+    fewer = len(run_at_once(read_frames(scene, [scene.camera], [door])))
     assert 2 < fewer < 40
     ball = bpy.data.objects.new("Ball", ball_mesh(0.1))
     scene.collection.objects.link(ball)
     ball.modifiers.new("Wave", "WAVE")
     door.parent, door.parent_type = ball, "VERTEX"
     bpy.context.view_layer.update()
-    assert read_frames(scene, [scene.camera], [door]) is None
+    assert run_at_once(read_frames(scene, [scene.camera], [door])) is None
     monkeypatch.setattr(frames, "MOST_WORK", 1e6)
-    assert read_frames(scene, [scene.camera], [door])
+    assert run_at_once(read_frames(scene, [scene.camera], [door]))
     monkeypatch.setattr(frames, "MOST_THINGS", 1)
-    assert read_frames(scene, [scene.camera], [door]) is None
+    assert run_at_once(read_frames(scene, [scene.camera], [door])) is None
 
 
 def test_what_is_shown_outside_of_the_range_is_not_rendered(scene):
@@ -454,11 +455,11 @@ def test_what_is_shown_outside_of_the_range_is_not_rendered(scene):
 def test_only_markers_that_choose_a_camera_are_cuts(scene):
     scene.frame_end = 5000
     turn_camera(scene, (90, 100))
-    before = [one.frame for one in read_frames(scene, [scene.camera], [])]
+    before = [one.frame for one in run_at_once(read_frames(scene, [scene.camera], []))]
     scene.timeline_markers.new("Note", frame=1234)
-    assert [one.frame for one in read_frames(scene, [scene.camera], [])] == before
+    assert [one.frame for one in run_at_once(read_frames(scene, [scene.camera], []))] == before
     scene.timeline_markers.new("Cut", frame=1234).camera = scene.camera
-    after = [one.frame for one in read_frames(scene, [scene.camera], [])]
+    after = [one.frame for one in run_at_once(read_frames(scene, [scene.camera], []))]
     assert sorted({*before, 1233, 1234}) == after
 
 
@@ -473,7 +474,7 @@ def test_the_camera_that_blender_chooses(scene, hidden):
         cameras[-1].hide_render = x in hidden
     scene.camera = first
     bpy.context.view_layer.update()
-    read = {one.frame: one.view.place for one in read_frames(scene, cameras, [])}
+    read = {one.frame: one.view.place for one in run_at_once(read_frames(scene, cameras, []))}
     for frame in (1, 9, 10, 11, 20, 100):
         scene.frame_set(frame)
         assert read[frame] == scene.camera.location
@@ -710,3 +711,80 @@ def test_a_thing_that_turns_under_an_open_sky_costs_little(scene):
     bpy.ops.sunsplit.convert()
     assert [to_light(lamp) @ TO_DOOR for lamp in suns(scene)] == pytest.approx([1], abs=1e-3)
     assert "reaches nothing that the camera shows" in scene.sunsplit.report
+
+
+@pytest.mark.parametrize("mode", ["XYZ", "ZYX", "QUATERNION"])
+def test_keys_alone_tell_where_a_camera_is(scene, mode):
+    """As evaluating the scene does, in every frame."""
+    camera = scene.camera
+    camera.rotation_mode, camera.scale = mode, (1, 2, -0.5)
+    turned = "rotation_quaternion" if mode == "QUATERNION" else "rotation_euler"
+    for frame, by in ((1, 0.0), (40, 1.0), (250, -0.7)):
+        camera.location[1] += by
+        getattr(camera, turned)[2] += by
+        camera.keyframe_insert("location", index=1, frame=frame)
+        camera.keyframe_insert(turned, frame=frame)
+    assert keyed_camera(camera)
+    by_keys = run_at_once(read_frames(scene, [camera], []))
+    evaluated = run_at_once(read_frames(scene, [camera], [scene.objects["Door"]]))
+    assert [one.frame for one in by_keys] == [one.frame for one in evaluated]
+    assert len({one.view.place[1] for one in by_keys}) > 10
+    for one, other in zip(by_keys, evaluated, strict=True):
+        assert np.allclose(one.view.place, other.view.place, atol=1e-6)
+        assert np.allclose(one.view.turn, other.view.turn, atol=1e-6)
+        assert one.view.corners == other.view.corners
+
+
+def _hang_on_a_parent(camera):
+    camera.parent = bpy.data.objects["Door"]
+
+
+def _drive(camera):
+    camera.driver_add("location", 0).driver.expression = "frame"
+
+
+def _zoom(camera):
+    camera.data.keyframe_insert("lens", frame=1)
+
+
+def _mute(camera):
+    made = camera.animation_data
+    bag = made.action.layers[0].strips[0].channelbag(made.action_slot)
+    bag.fcurves[0].mute = True
+
+
+def _shift(camera):
+    camera.delta_location[0] = 1
+
+
+def _aim(camera):
+    camera.constraints.new("TRACK_TO")
+
+
+@pytest.mark.parametrize("change", [_hang_on_a_parent, _drive, _zoom, _mute, _shift, _aim])
+def test_more_than_keys_must_be_evaluated(scene, change):
+    turn_camera(scene, (90, 100))
+    assert keyed_camera(scene.camera)
+    change(scene.camera)
+    assert keyed_camera(scene.camera) is None
+
+
+def test_the_window_has_moments_while_frames_are_read(scene, monkeypatch):
+    monkeypatch.setattr(frames, "LEAST_AT_ONCE", 50)
+    open_door(scene, (1, 250))
+    scenes = len(bpy.data.scenes)
+    steps = read_frames(scene, [scene.camera], [scene.objects["Door"]])
+    moments, readings = 0, None
+    while readings is None:
+        try:
+            assert next(steps) is None
+        except StopIteration as done:
+            readings = done.value
+        else:
+            moments += 1
+            assert len(bpy.data.scenes) == scenes  # nothing is left that the user could see
+    monkeypatch.setattr(frames, "LEAST_AT_ONCE", 1e9)
+    at_once = run_at_once(read_frames(scene, [scene.camera], [scene.objects["Door"]]))
+    assert moments > 2
+    for one, other in zip(readings, at_once, strict=True):
+        assert (one.frame, one.places) == (other.frame, other.places)

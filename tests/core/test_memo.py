@@ -26,6 +26,7 @@ CHOICES = [
     {"lights": 3},
     *({"lights": lights} for lights in (4, 5, 9, 12, 16, 17, 2, 12)),
     {"lights": 6, "shape": "point"},
+    *({"lights": lights, "share": 0.9} for lights in (40, 6, 70, 20)),
     {"lights": 3, "share": 0.4},
     {"tolerance": 3},
     {"share": 0.7},
@@ -57,6 +58,17 @@ def test_another_number_of_lights_makes_no_patches_again(monkeypatch):
     convert(world, ConversionSettings(lights=1, share=0.8))
     monkeypatch.setattr(patches, "_pixels", None)  # would raise
     assert len(convert(world, ConversionSettings(lights=2, share=0.8)).suns) == 2
+
+
+def test_light_is_not_summed_again_for_another_number_of_patches(monkeypatch):
+    world = sunny()
+    few, many = ({"lights": lights, "share": 0.9} for lights in (3, 40))
+    convert(world, ConversionSettings(**few))
+    counts = set()
+    for one in (few, many):
+        counts.add(len(convert(world, ConversionSettings(**one)).cells.taken.squares))
+        monkeypatch.setattr(patches, "_pyramid", None)  # would raise
+    assert len(counts) == 2
 
 
 def test_what_is_kept_of_a_map_goes_with_the_map():
