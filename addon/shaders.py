@@ -12,18 +12,19 @@ import bpy
 SHARP = 0.25
 """Roughness below which a surface may show single pixels of a wide map."""
 
-MATT = 0.4
-"""Roughness from which a lacquer, as plastics have it, is a faint and wide gloss."""
+MATT, WIDE = 0.4, math.radians(30.0)
+"""Roughness from which a lacquer, as plastics have it, gives a faint and wide gloss, which is less
+noisy where rays do not meet suns up to so wide; this and the next by docs/benchmarks/met_suns.md.
+"""
+
+ROUGH = 0.5
+"""And so for all suns: it is nearly as if there were no lacquer."""
 
 LACQUER = 1.5
 """Index of refraction up to which it is one."""
 
 NARROW = math.radians(3.0)
 """Suns that wide the rays of rough surfaces meet so rarely that nobody can tell whether they do."""
-
-WIDE = math.radians(30.0)
-"""Suns up to which matt surfaces are less noisy where their rays do not meet any; this and the
-last by docs/benchmarks/met_suns.md."""
 
 ANY = math.pi
 """The widest that Blender has: suns need not be met at all."""
@@ -88,16 +89,18 @@ def unmet_width(node: bpy.types.Node) -> float:
     if is_sharp(node):
         return 0.0
     if node.type == "BSDF_PRINCIPLED":
-        return WIDE if _is_matt(node) else NARROW
+        return _unmet_by_lacquer(node)
     if node.type in GLOSSY:
         return NARROW
     gives_shader = any(socket.type == "SHADER" for socket in node.outputs)
     return ANY if node.type in DIFFUSE or not gives_shader else 0.0
 
 
-def _is_matt(node: bpy.types.Node) -> bool:
+def _unmet_by_lacquer(node: bpy.types.Node) -> float:
     most = {"Metallic": 0, "Transmission Weight": 0, "Coat Weight": 0, "Sheen Weight": 0}
     most |= {"Specular IOR Level": 0.5, "IOR": LACQUER, "Anisotropic": 0}
     if any(is_above(node, name, value) for name, value in most.items()):
-        return False
-    return not _is_smooth(node, "Roughness", MATT)
+        return NARROW
+    if not _is_smooth(node, "Roughness", ROUGH):
+        return ANY
+    return NARROW if _is_smooth(node, "Roughness", MATT) else WIDE

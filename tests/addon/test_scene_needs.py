@@ -163,7 +163,8 @@ def test_a_roughness_that_cannot_be_told_is_sharp(scene):
 @pytest.mark.parametrize(
     ("inputs", "degrees"),
     [
-        ({"Roughness": 0.5}, 30),
+        ({"Roughness": 0.5}, 180),
+        ({"Roughness": 0.4}, 30),
         ({"Roughness": 0.39}, 3),
         ({"Roughness": 0.5, "Metallic": 1.0}, 3),
         ({"Roughness": 0.5, "Specular_IOR_Level": 0.6}, 3),
