@@ -6,8 +6,9 @@ For each map and scene: the plain HDRI as Blender sets it up, the plain HDRI wit
 sampling that one might set by hand, and the conversion by default, all interleaved in one run.
 Errors are RMS over pixels and channels against a long reference of the plain HDRI, relative to its
 mean, the reference's own noise taken off. Time is from the call of render to its end. Time to an
-error is read off a fit of noise^2 = a / samples and seconds = b + c * samples. Peak memory is that
-of a process that opens the file and renders one sample a pixel.
+error is interpolated between numbers of samples: noise falls faster than their square root, as
+samples know of each other. Peak memory is that of a process that opens the file and renders one
+sample a pixel.
 """
 
 from __future__ import annotations
@@ -47,31 +48,45 @@ TILES = 8
 class Curve:
     """What one configuration of a map and scene needs.
 
-    lamps: of the conversion. noise: variance of one sample a pixel, in squares of the mean.
-    bias: RMS that more samples would not take away, and unsure, the standard error of its square.
-    mean: of the picture against the reference's. start, each: seconds before the first sample and
-    for each sample a pixel. memory: MB at the peak.
+    lamps: of the conversion. samples: a pixel, of some pictures, rising. noise: variance of these,
+    in squares of the mean. seconds: that they took. bias: RMS that more samples would not take
+    away, and unsure, the standard error of its square. mean: of the picture against the
+    reference's. memory: MB at the peak.
     """
 
     map: str
     scene: str
     way: str
     lamps: int
-    noise: float
+    samples: tuple[int, ...]
+    noise: tuple[float, ...]
+    seconds: tuple[float, ...]
     bias: float
     unsure: float
     mean: float
-    start: float
-    each: float
     memory: float
 
     def seconds_to(self, error: float) -> float:
-        """Seconds to an RMS error, one sample at least; infinite where bias alone exceeds it, as
-        far as there certainly is one."""
+        """Seconds to an RMS error; infinite where bias alone exceeds it, as far as there certainly
+        is one."""
         rest = error**2 - max(self.bias**2 - 2 * self.unsure, 0)
-        if rest <= 0:
-            return np.inf
-        return self.start + self.each * max(self.noise / rest, 1.0)
+        return self._seconds_of(self._samples_to(rest)) if rest > 0 else np.inf
+
+    def _samples_to(self, noise: float) -> float:
+        """Samples to this variance: between two pictures its logarithm is straight over that of
+        their samples, beyond the last one it falls as these rise."""
+        falling = np.minimum.accumulate(self.noise)
+        if noise < falling[-1]:
+            return self.samples[-1] * falling[-1] / noise
+        logs = np.interp(-np.log(noise), -np.log(falling), np.log(self.samples))
+        return float(np.exp(logs))
+
+    def _seconds_of(self, samples: float) -> float:
+        """Between two pictures straight, beyond the last one as between the last two."""
+        if samples <= self.samples[-1] or len(self.samples) == 1:
+            return float(np.interp(samples, self.samples, self.seconds))
+        each = (self.seconds[-1] - self.seconds[-2]) / (self.samples[-1] - self.samples[-2])
+        return self.seconds[-1] + max(each, 0.0) * (samples - self.samples[-1])
 
 
 def curves_of(path: Path, scene: str, options: argparse.Namespace) -> list[Curve]:
@@ -159,12 +174,10 @@ def _curve(
     memory: float,
 ) -> Curve:
     mean = float(np.mean(halves))
-    noises = []
-    for samples in sorted({one[0] for one in shots}):
-        images = [image for count, image, _ in shots if count == samples]
-        noises.append(samples * np.var(images, axis=0, ddof=1).mean() / mean**2)
-    most = max(one[0] for one in shots)
-    longest = [image for count, image, _ in shots if count == most]
+    samples = sorted({count for count, _, _ in shots})
+    images = {n: [image for count, image, _ in shots if count == n] for n in samples}
+    took = {n: [seconds for count, _, seconds in shots if count == n] for n in samples}
+    longest = images[samples[-1]]
     # Products of differences that share neither render nor reference: noise averages out.
     products = [
         (longest[i] - halves[i % 2]) * (longest[j] - halves[j % 2])
@@ -173,27 +186,16 @@ def _curve(
         if (j - i) % 2
     ]
     square = np.mean(products, axis=0)
-    start, each = _times({count: _median(shots, count) for count in {one[0] for one in shots}})
     return Curve(
         *name,
-        noise=float(np.median(noises)),
+        samples=tuple(samples),
+        noise=tuple(float(np.var(images[n], axis=0, ddof=1).mean()) / mean**2 for n in samples),
+        seconds=tuple(float(np.median(took[n])) for n in samples),
         bias=float(np.sqrt(max(square.mean(), 0))) / mean,
         unsure=_standard_error(square) / mean**2,
         mean=float(np.mean(longest)) / mean - 1,
-        start=start,
-        each=each,
         memory=memory,
     )
-
-
-def _times(seconds: dict[int, float]) -> tuple[float, float]:
-    """Seconds before the first sample and for each, by those of so many samples: neither is below
-    0, as a straight line may have it where short renders take as long as the machine likes."""
-    from scipy.optimize import nnls
-
-    rows = np.array([(1.0, count) for count in seconds])
-    start, each = nnls(rows, np.array(list(seconds.values())))[0]
-    return float(start), float(each)
 
 
 def _standard_error(pixels: np.ndarray) -> float:
@@ -204,10 +206,6 @@ def _standard_error(pixels: np.ndarray) -> float:
     return float(means.std(ddof=1) / np.sqrt(means.size))
 
 
-def _median(shots: list[tuple[int, np.ndarray, float]], samples: int) -> float:
-    return float(np.median([seconds for count, _, seconds in shots if count == samples]))
-
-
 def main(arguments: Sequence[str] | None = None) -> list[Curve]:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("maps", nargs="+", type=Path, metavar="MAP")
@@ -216,7 +214,7 @@ def main(arguments: Sequence[str] | None = None) -> list[Curve]:
     parser.add_argument("--by-hand", nargs="*", choices=BY_HAND, default=list(BY_HAND))
     parser.add_argument("--width", type=int, default=0, help="enlarge narrower maps to so many")
     parser.add_argument("--size", type=int, default=96)
-    parser.add_argument("--samples", type=int, nargs="+", default=[4, 16, 64])
+    parser.add_argument("--samples", type=int, nargs="+", default=[4, 16, 64, 256])
     parser.add_argument("--repeats", type=int, default=2)
     parser.add_argument("--reference", type=int, default=2048, help="samples of each of two")
     parser.add_argument("--name", default="equal_error", help="of table and plot")

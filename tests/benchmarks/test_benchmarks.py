@@ -114,21 +114,34 @@ def test_equal_error(tmp_path, sunrise):
     few += ["--by-hand", "NONE", "256", "--reference", "16", "-o", str(tmp_path)]
     curves = equal_error.main([str(sunrise), *few])
     assert len(curves) == 2 * (2 + 2)
-    assert all(curve.noise > 0 for curve in curves)
+    assert all(min(*made.noise, *made.seconds) > 0 for made in curves)
     lines = (tmp_path / "equal_error.md").read_text().splitlines()
     assert sum(line.startswith("| spruit_sunrise_1k") for line in lines) == 2
 
 
+def curve(samples, noise, seconds, bias=0.0):
+    return equal_error.Curve("", "", "", 0, samples, noise, seconds, bias, 0.0, 0.0, 0.0)
+
+
 @pytest.mark.parametrize(
-    ("seconds", "expected"),
+    ("error", "seconds"),
     [
-        ({1: 2.0, 4: 5.0, 16: 17.0}, (1, 1)),
-        ({1: 2.0, 4: 1.0}, (1.5, 0)),  # more samples in less time: nothing can be told of one
-        ({1: 1.0, 4: 7.0}, (0, 29 / 17)),
+        (0.3, 2.0),  # of the fewest samples there is a picture of
+        (0.2, 2.0),
+        (0.1, 3.0),  # halfway by logarithms, of noise as of samples: 8
+        (0.05, 5.0),
+        (0.025, 5.0 + 48 * 0.25),  # 4 times 16
     ],
 )
-def test_times_of_samples_are_none_below_zero(seconds, expected):
-    assert equal_error._times(seconds) == pytest.approx(expected)
+def test_time_to_an_error_is_interpolated(error, seconds):
+    made = curve((4, 16), (0.04, 0.0025), (2.0, 5.0))
+    assert made.seconds_to(error) == pytest.approx(seconds)
+
+
+def test_a_bias_takes_more_samples_or_is_never_made_up_for():
+    made = curve((4, 16), (0.04, 0.01), (2.0, 5.0), bias=0.08)
+    assert made.seconds_to(0.1) == pytest.approx(5 + (0.01 / 0.0036 - 1) * 16 * 0.25)
+    assert made.seconds_to(0.08) == np.inf
 
 
 @once
