@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -103,6 +103,13 @@ class Moment:
                 yield
         return False
 
+    def part_of_picture(self, names: Container[str]) -> float:
+        """How much of it shows things of these names, or such as only renders hide, by few rays."""
+        hits = [self._nearest(*ray, self.view.far) for ray in _rays(self.view, *COARSE)]
+        things = [hit.things for hit in hits if hit]
+        shown = [any(one.name in names or one.hide_render for one in some) for some in things]
+        return sum(shown) / len(hits)
+
     def cast(
         self, start: Vector, direction: Vector, passed: list[Place] | None = None
     ) -> Place | None:
@@ -170,6 +177,14 @@ class Sight:
             if (yield from moment.camera_sees_world(in_turn)):
                 return True
         return False
+
+    def part_of_picture(self, names: Container[str]) -> Steps[float]:
+        """How much of it shows things of these names, at most in any frame that is looked at."""
+        parts = [0.0]
+        for moment in self.moments:
+            parts.append(moment.part_of_picture(names))
+            yield
+        return max(parts)
 
 
 def sight_of(

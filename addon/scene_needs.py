@@ -5,7 +5,7 @@ Whatever cannot be told is needed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 import bpy
@@ -14,8 +14,9 @@ from ..core.environment import whole_part, whole_part_from
 from .moments import Panes, Sight, sight_of
 from .ordinary import is_all_met, is_seen_as_rendered, shown_things
 from .rig import guards_of, rig_of
-from .shaders import ANY, is_seen_through, is_sharp, is_translucent, shines, unmet_width
+from .shaders import is_seen_through, is_sharp, is_translucent, nodes_of, shines
 from .steps import Steps, run_at_once
+from .unmet import unmet_steps
 from .views import finest_width, is_ordinary, view_of
 
 LIGHTING_WIDTH = 1024
@@ -28,7 +29,7 @@ class SceneNeeds:
     """camera_sees_world: or a render may show it behind transparent things. mirrors: something
     reflects or refracts sharply. other_lights: something but the world and lamps of conversions
     gives light. fog: something may scatter light on its way. unmet_width: angular diameter, in
-    radians, of the widest suns that rays need not meet (see `shaders`). camera_width: pixels around
+    radians, of the widest suns that rays need not meet (see `unmet`). camera_width: pixels around
     the sphere that a picture can tell apart; None: any. sight: the scene for rays that ask what
     light reaches; None: they would not tell. looked: where anything moves, how many frames were
     looked at, and the first and last of their range."""
@@ -69,7 +70,7 @@ def needs_steps(scene: bpy.types.Scene, look: bool = True) -> Steps[SceneNeeds]:
     move. look: else only what gives or scatters light is told, and all else needed."""
     shown = users_things(scene)
     trees = _trees(scene, shown)
-    nodes = [node for tree in trees for node in _nodes(tree)]
+    nodes = [node for tree in trees for node in nodes_of(tree)]
     lights = any(thing.type == "LIGHT" for thing in shown) or any(shines(node) for node in nodes)
     fog = _is_foggy(scene, nodes)
     changes = any(tree.animation_data for tree in trees)
@@ -81,14 +82,16 @@ def needs_steps(scene: bpy.types.Scene, look: bool = True) -> Steps[SceneNeeds]:
     if is_seen_as_rendered(scene, shown):
         sight = yield from sight_of(scene, shown, _panes(shown))
     sees_world = yield from _sees_world(scene, nodes, sight)
+    told = sight if sight and _is_told_by_rays(scene, shown, nodes, sight) else None
+    unmet_width = 0.0 if fog else (yield from unmet_steps(nodes, shown, told))
     return SceneNeeds(
         camera_sees_world=sees_world,
         mirrors=any(is_sharp(node) for node in nodes),
         other_lights=lights,
         fog=fog,
-        unmet_width=0.0 if fog else min(map(unmet_width, nodes), default=ANY),
+        unmet_width=unmet_width,
         camera_width=_camera_width(scene, sight),
-        sight=sight if sight and _is_told_by_rays(scene, shown, nodes, sight) else None,
+        sight=told,
         looked=(len(sight.moments), *sight.frames) if sight and sight.frames else None,
     )
 
@@ -103,7 +106,7 @@ def users_things(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 def _is_foggy(scene: bpy.types.Scene, nodes: Iterable[bpy.types.Node]) -> bool:
     tree = scene.world and scene.world.node_tree
-    outputs = [*nodes, *(_nodes(tree) if tree else ())]
+    outputs = [*nodes, *(nodes_of(tree) if tree else ())]
     kinds = ("OUTPUT_MATERIAL", "OUTPUT_WORLD")
     return any(n.type in kinds and n.inputs["Volume"].is_linked for n in outputs)
 
@@ -164,7 +167,7 @@ def _wears(thing: bpy.types.Object, materials: set[bpy.types.Material]) -> bool:
 
 
 def _has(material: bpy.types.Material, kind: Callable[[bpy.types.Node], bool]) -> bool:
-    return material.node_tree is not None and any(map(kind, _nodes(material.node_tree)))
+    return material.node_tree is not None and any(map(kind, nodes_of(material.node_tree)))
 
 
 def _trees(scene: bpy.types.Scene, shown: list[bpy.types.Object]) -> list[bpy.types.NodeTree]:
@@ -181,14 +184,6 @@ def _trees(scene: bpy.types.Scene, shown: list[bpy.types.Object]) -> list[bpy.ty
         # What is instanced or made by geometry nodes may wear any material of the file.
         found |= {made.node_tree: None for made in bpy.data.materials if made.node_tree}
     return list(found)
-
-
-def _nodes(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:
-    """All nodes of a tree, those in its groups too."""
-    for node in tree.nodes:
-        yield node
-        if node.type == "GROUP" and node.node_tree:
-            yield from _nodes(node.node_tree)
 
 
 def _sees_world(

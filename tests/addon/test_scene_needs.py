@@ -200,6 +200,20 @@ def test_shaders_that_need_not_meet_suns(scene, kind, degrees):
     assert needs_of(scene).unmet_width == pytest.approx(np.radians(degrees))
 
 
+def test_a_little_lacquer_does_not_count(scene):
+    """It makes its own surface noisier, and all else calmer."""
+    made = material("New", (1, 1, 1), Roughness=0.4)
+    ball = add_mesh(scene, box_mesh(0.05, 0.05, 0.1), made, Matrix.Translation((0.9, 0, 0)))
+    assert needs_of(scene).unmet_width == pytest.approx(np.pi)
+    ball.location.x = 0.1
+    bpy.context.view_layer.update()
+    assert needs_of(scene).unmet_width == pytest.approx(np.radians(30))
+    ball.location.x = 0.9
+    ball.modifiers.new("Any", "NODES")  # may wear what it likes
+    bpy.context.view_layer.update()
+    assert needs_of(scene).unmet_width == pytest.approx(np.radians(30))
+
+
 def test_in_fog_suns_are_met(scene):
     fill_with_fog(scene)
     assert needs_of(scene).unmet_width == 0

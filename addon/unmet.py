@@ -1,0 +1,97 @@
+"""Which suns the rays that go on from surfaces need not meet.
+
+A path tracer looks for suns, and its rays may meet them by chance besides (Cycles' "multiple
+importance" of a lamp). Mirrors need that: without it they show no sun. To rough surfaces it is a
+second way to the same light, which takes time, and of which suns are noisier than of the first
+alone. All bounds are by docs/benchmarks/met_suns.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import bpy
+
+from .moments import Sight
+from .shaders import GLOSSY, is_above, is_sharp, is_smooth, nodes_of
+from .steps import Steps
+
+ANY = math.pi
+"""The widest sun that Blender has, in radians: none need be met."""
+
+NARROW = math.radians(3.0)
+"""Suns that wide the rays of rough surfaces meet so rarely that nobody can tell whether they do."""
+
+ROUGH = 0.5
+"""Roughness from which a lacquer, as plastics have it, is as if it were not there."""
+
+MATT, WIDE = 0.4, math.radians(30.0)
+"""Roughness from which its gloss is faint and wide: less noisy without rays that meet suns up to so
+wide, but up to 1.7 times as noisy without those that meet wider ones."""
+
+LITTLE = 0.1
+"""Of a picture: so much of it may be so noisy, if all else is a tenth to a third calmer for it."""
+
+LACQUER = 1.5
+"""Index of refraction up to which a gloss counts as faint."""
+
+DIFFUSE = {
+    *("BSDF_DIFFUSE", "BSDF_TRANSLUCENT", "SUBSURFACE_SCATTERING", "BSDF_TRANSPARENT"),
+    *("EMISSION", "HOLDOUT", "MIX_SHADER", "ADD_SHADER", "GROUP", "GROUP_INPUT"),
+    *("BACKGROUND", "REROUTE"),
+}
+"""Nodes with a shader that reflect evenly, or nothing themselves."""
+
+
+def unmet_steps(
+    nodes: Iterable[bpy.types.Node], shown: Sequence[bpy.types.Object], sight: Sight | None
+) -> Steps[float]:
+    """Angular diameter, in radians, of the widest suns that no ray in a scene need meet. nodes: of
+    all materials that its things, `shown`, may wear. sight: the scene for rays, if they tell."""
+    width = min(map(unmet_width, nodes), default=ANY)
+    if width != WIDE or sight is None or not _are_worn_as_told(shown):
+        return width
+    lacquered = {thing.name for thing in shown if any(map(_is_faint, _worn_by(thing)))}
+    part = yield from sight.part_of_picture(lacquered)
+    return ANY if part <= LITTLE else WIDE
+
+
+def unmet_width(node: bpy.types.Node) -> float:
+    """The same of a surface that is made of this node."""
+    if is_sharp(node):
+        return 0.0
+    if node.type == "BSDF_PRINCIPLED":
+        return _unmet_by_lacquer(node)
+    if node.type in GLOSSY:
+        return NARROW
+    gives_shader = any(socket.type == "SHADER" for socket in node.outputs)
+    return ANY if node.type in DIFFUSE or not gives_shader else 0.0
+
+
+def _unmet_by_lacquer(node: bpy.types.Node) -> float:
+    most = {"Metallic": 0, "Transmission Weight": 0, "Coat Weight": 0, "Sheen Weight": 0}
+    most |= {"Specular IOR Level": 0.5, "IOR": LACQUER, "Anisotropic": 0}
+    if any(is_above(node, name, value) for name, value in most.items()):
+        return NARROW
+    if not is_smooth(node, "Roughness", ROUGH):
+        return ANY
+    return NARROW if is_smooth(node, "Roughness", MATT) else WIDE
+
+
+def _is_faint(node: bpy.types.Node) -> bool:
+    return unmet_width(node) == WIDE
+
+
+def _are_worn_as_told(shown: Iterable[bpy.types.Object]) -> bool:
+    """Whether things wear what their slots say, and nothing that modifiers give them."""
+    return not any(
+        thing.instance_type != "NONE" or any(made.type == "NODES" for made in thing.modifiers)
+        for thing in shown
+    )
+
+
+def _worn_by(thing: bpy.types.Object) -> Iterable[bpy.types.Node]:
+    for slot in thing.material_slots:
+        if slot.material and slot.material.node_tree:
+            yield from nodes_of(slot.material.node_tree)
