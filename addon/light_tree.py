@@ -18,6 +18,7 @@ from bpy.app.translations import pgettext_rpt as said
 from mathutils import Vector
 
 from ..core.conversion import Conversion
+from ..core.passes import parts_of
 from ..core.sampling import MOST_IN_TREE, needs_light_tree
 from .lamps import FARTHEST, GUARDS, LEAST, lamp_data
 from .rig import GUARD, Rig
@@ -58,7 +59,7 @@ def tree_plan(
     if not scene.cycles.use_light_tree and not scene.sunsplit.light_tree_off:
         return TreePlan()  # as the user has it
     others = needs.other_lights or by_portals
-    if not others and not needs_light_tree(conversion.suns, conversion.strata.light):
+    if not others and not _pays(conversion):
         return TreePlan(is_idle=True)
     if not conversion.suns or not overflows(len(conversion.suns) + _other_suns(scene)):
         return TreePlan()
@@ -72,6 +73,14 @@ def tree_plan(
         "fewer lights."
     )
     return TreePlan(guarded=True, warnings=(line,))
+
+
+def _pays(conversion: Conversion) -> bool:
+    """Whether the tree saves more noise than time."""
+    if not conversion.suns:
+        return False
+    _, residual = parts_of(conversion, by_strength=True)
+    return needs_light_tree(conversion.suns, conversion.strata.light, residual.variance)
 
 
 def overflows(suns: int) -> bool:

@@ -43,7 +43,7 @@ MOST_IN_TREE = 32
 """So many lights at infinity, the world among them, Cycles' light tree can draw from where none of
 them is wholly above a surface; beyond, it leaves out light (see `addon.light_tree`)."""
 
-TIME_BY_TREE, TIME_BY_LOT = 0.05, 0.01
+TIME_BY_TREE, TIME_BY_LOT = 0.065, 0.01
 """More time for each sun, as a part of a picture's, where a path tracer chooses among suns by their
 strength, with a light tree, and where it draws lots; by docs/benchmarks/light_tree.md."""
 
@@ -83,16 +83,17 @@ def choose_sampling(
     return WorldSampling("AUTOMATIC" if peak > CALM_PEAK else "MANUAL")
 
 
-def needs_light_tree(suns: Sequence[Sun], light: float) -> bool:
+def needs_light_tree(suns: Sequence[Sun], light: float, beside: float = 0.0) -> bool:
     """Whether suns should be chosen by their strength, which takes time for each, or by lot, which
     is noisier where they are not alike.
 
-    light: luminance of the whole map's scalar irradiance.
+    light: luminance of the whole map's scalar irradiance. beside: variance of a sample that comes
+    from the residual, however suns are chosen.
     """
     count = len(suns)
     if count <= 1:
         return False
-    by_strength, by_lot = variance_of_suns(suns, light)
+    by_strength, by_lot = (beside + variance for variance in variance_of_suns(suns, light))
     return by_strength * (1 + TIME_BY_TREE * count) < by_lot * (1 + TIME_BY_LOT * count)
 
 

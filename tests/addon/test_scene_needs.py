@@ -175,7 +175,7 @@ def test_a_roughness_that_cannot_be_told_is_sharp(scene):
 def test_suns_that_need_not_be_met(scene, inputs, degrees):
     assert needs_of(scene).unmet_width == pytest.approx(np.pi)
     made = material("New", (1, 1, 1), **inputs)
-    add_mesh(scene, plate_mesh(0.1), made, Matrix())
+    add_mesh(scene, box_mesh(0.1, 0.1, 0.2), made, Matrix.Translation((0.2, 0, -0.1)))
     assert needs_of(scene).unmet_width == pytest.approx(np.radians(degrees))
 
 

@@ -67,5 +67,15 @@ def test_suns_that_are_alike_need_no_light_tree(strengths, needed):
 def test_dozens_of_suns_are_drawn_by_lot_if_the_tree_costs_more_than_noise():
     strengths = np.linspace(1, 2, 60)
     assert not needs_light_tree(some_suns(strengths), strengths.sum())
+
+
+def test_a_noisy_residual_makes_it_matter_less_how_suns_are_chosen():
+    strengths = [4, 1, 1, 1, 1, 1, 1, 1]
+    assert needs_light_tree(some_suns(strengths), 15)
+    assert not needs_light_tree(some_suns(strengths), 15, beside=3.0)
+
+
+def test_one_strong_sun_of_dozens_needs_the_light_tree():
+    strengths = np.linspace(1, 2, 60)
     strengths[0] = 60
     assert needs_light_tree(some_suns(strengths), strengths.sum())
