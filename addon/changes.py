@@ -86,6 +86,13 @@ def is_animated(owner: bpy.types.ID | None) -> bool:
     return bool(made and (made.action or len(made.drivers) or len(made.nla_tracks)))
 
 
+def appears(thing: bpy.types.Object) -> bool:
+    """Whether it is hidden in some frames and shown in others, or may be."""
+    if not thing.animation_data:  # most have none
+        return False
+    return any(path.startswith("hide") for path in animated_paths(thing))
+
+
 def animated_paths(owner: bpy.types.ID | None) -> Iterator[str]:
     """All properties of something that its keys, drivers and strips change."""
     made = getattr(owner, "animation_data", None)

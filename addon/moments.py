@@ -104,11 +104,14 @@ class Moment:
         return False
 
     def part_of_picture(self, names: Container[str]) -> float:
-        """How much of it shows things of these names, or such as only renders hide, by few rays."""
+        """How much of it shows things of these names, or what one may see them through, by few
+        rays."""
         hits = [self._nearest(*ray, self.view.far) for ray in _rays(self.view, *COARSE)]
-        things = [hit.things for hit in hits if hit]
-        shown = [any(one.name in names or one.hide_render for one in some) for some in things]
-        return sum(shown) / len(hits)
+        met = [hit.things for hit in hits if hit]
+        return sum(any(self._may_show(names, one) for one in some) for some in met) / len(hits)
+
+    def _may_show(self, names: Container[str], thing: bpy.types.Object) -> bool:
+        return thing.name in names or thing.name in self.panes.all or thing.hide_render
 
     def cast(
         self, start: Vector, direction: Vector, passed: list[Place] | None = None

@@ -12,7 +12,7 @@ from itertools import chain
 
 import bpy
 
-from .changes import PLACE, SHAPE, SHAPELESS, animated_paths, changes_of, is_animated
+from .changes import PLACE, SHAPE, SHAPELESS, animated_paths, appears, changes_of, is_animated
 
 FROM_ELSEWHERE = {"CAMERA_SOLVER", "FOLLOW_TRACK", "OBJECT_SOLVER"}
 """Constraints that ask for more of a scene than its objects."""
@@ -34,7 +34,7 @@ def moving(
     shown, cameras = list(shown), cameras_of(scene)
     instanced = {thing.instance_collection for thing in shown} - {None}
     members = (made.all_objects for made in instanced)
-    if any(_appears(thing) for thing in {*scene.objects, *chain.from_iterable(members)}):
+    if any(appears(thing) for thing in {*scene.objects, *chain.from_iterable(members)}):
         return None
     changed = changes_of({*shown, *cameras})
     if any((thing, SHAPE) in changed for thing in shown if thing.type not in SHAPELESS):
@@ -61,12 +61,6 @@ def cuts_of(scene: bpy.types.Scene) -> list[bpy.types.TimelineMarker]:
     show."""
     markers = scene.timeline_markers
     return [made for made in markers if made.camera and not made.camera.hide_render]
-
-
-def _appears(thing: bpy.types.Object) -> bool:
-    if not thing.animation_data:  # most have none
-        return False
-    return any(path.startswith("hide") for path in animated_paths(thing))
 
 
 def _is_untold(

@@ -8,6 +8,7 @@ from operator import attrgetter
 
 import bpy
 
+from .changes import appears
 from .motion import cameras_of
 from .passes import users_layers
 from .shapes import Shape, are_flattened
@@ -23,18 +24,20 @@ _is_visible = attrgetter(*(f"visible_{ray}" for ray in RAYS))
 
 
 def shown_things(
-    things: Iterable[bpy.types.Object], known: set[bpy.types.Collection] | None = None
+    things: Iterable[bpy.types.Object],
+    ever: bool = False,
+    known: set[bpy.types.Collection] | None = None,
 ) -> Iterator[bpy.types.Object]:
     """Things that renders may show, and those in collections that they are instances of: of each
-    collection once. known: collections that are not asked for any more."""
+    collection once. ever: in any frame. known: collections that are not asked for any more."""
     known = set() if known is None else known
     for thing in things:
-        if not thing.hide_render:
+        if not thing.hide_render or (ever and appears(thing)):
             yield thing
             made = thing.instance_collection
             if made and made not in known:
                 known.add(made)
-                yield from shown_things(made.all_objects, known)
+                yield from shown_things(made.all_objects, ever, known)
 
 
 def is_seen_as_rendered(scene: bpy.types.Scene, shown: Iterable[bpy.types.Object]) -> bool:

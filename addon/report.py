@@ -100,8 +100,8 @@ def skipped_sentences(
     if any(sun.angular_diameter <= needs.unmet_width for sun in conversion.suns):
         lines.append(
             said(
-                "Skipped: nothing mirrors sharply, so rays need not meet lamps by chance; Cycles "
-                "looks for them."
+                "Skipped: nothing mirrors sharply, so rays need not meet lamps by chance. If you "
+                "add a mirror, convert again: till then it shows no sun."
             )
         )
     if tree_off:

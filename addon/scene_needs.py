@@ -68,13 +68,14 @@ def needs_of(scene: bpy.types.Scene) -> SceneNeeds:
 def needs_steps(scene: bpy.types.Scene, look: bool = True) -> Steps[SceneNeeds]:
     """Look at a scene: its camera, lamps, materials and shapes; in several frames where they
     move. look: else only what gives or scatters light is told, and all else needed."""
-    shown = users_things(scene)
-    trees = _trees(scene, shown)
+    ever = users_things(scene, ever=True)
+    shown = users_things(scene) if any(thing.hide_render for thing in ever) else ever
+    trees = _trees(scene, ever)
     nodes = [node for tree in trees for node in nodes_of(tree)]
-    lights = any(thing.type == "LIGHT" for thing in shown) or any(shines(node) for node in nodes)
-    fog = _is_foggy(scene, nodes)
-    changes = any(tree.animation_data for tree in trees)
-    if changes or any(node.type == "SCRIPT" for node in nodes):
+    lights = any(thing.type == "LIGHT" for thing in ever) or any(shines(node) for node in nodes)
+    fog = _is_foggy(scene, ever, nodes)
+    changes = any(tree.animation_data for tree in trees) or any(map(_is_animated_group, nodes))
+    if changes or scene.background_set or any(node.type == "SCRIPT" for node in nodes):
         return replace(ALL, fog=fog)
     if not look:
         return replace(ALL, other_lights=lights, fog=fog)
@@ -96,15 +97,23 @@ def needs_steps(scene: bpy.types.Scene, look: bool = True) -> Steps[SceneNeeds]:
     )
 
 
-def users_things(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """What renders may show and no conversion has made, once each."""
+def users_things(scene: bpy.types.Scene, ever: bool = False) -> list[bpy.types.Object]:
+    """What renders may show and no conversion has made, once each. ever: in any frame."""
     state = scene.sunsplit
     own = {entry.lamp for entry in state.lamps} | {*rig_of(state.sky), *guards_of(state.sky)}
     own |= {entry.lamp for entry in state.portals}
-    return list(dict.fromkeys(shown_things(t for t in scene.objects if t not in own)))
+    return list(dict.fromkeys(shown_things((t for t in scene.objects if t not in own), ever)))
 
 
-def _is_foggy(scene: bpy.types.Scene, nodes: Iterable[bpy.types.Node]) -> bool:
+def _is_animated_group(node: bpy.types.Node) -> bool:
+    return node.type == "GROUP" and bool(node.node_tree and node.node_tree.animation_data)
+
+
+def _is_foggy(
+    scene: bpy.types.Scene, shown: Iterable[bpy.types.Object], nodes: Iterable[bpy.types.Node]
+) -> bool:
+    if any(thing.type == "VOLUME" for thing in shown):
+        return True
     tree = scene.world and scene.world.node_tree
     outputs = [*nodes, *(nodes_of(tree) if tree else ())]
     kinds = ("OUTPUT_MATERIAL", "OUTPUT_WORLD")

@@ -12,6 +12,10 @@ import bpy
 SHARP = 0.25
 """Roughness below which a surface may show single pixels of a wide map."""
 
+BENDS = 0.1
+"""From how far off 1 an index of refraction spreads light that goes through rough glass; nearer, it
+is as sharp as the lamp that it comes from. At 1.05 nothing of that is left to be seen."""
+
 TRANSLUCENT = {
     *("BSDF_GLASS", "BSDF_REFRACTION", "BSDF_TRANSLUCENT", "SUBSURFACE_SCATTERING"),
     *("BSDF_HAIR", "BSDF_HAIR_PRINCIPLED"),
@@ -40,10 +44,23 @@ def shines(node: bpy.types.Node) -> bool:
 
 
 def is_sharp(node: bpy.types.Node) -> bool:
+    if _lets_straight_through(node):
+        return True
     if node.type == "BSDF_PRINCIPLED":
         coated = is_above(node, "Coat Weight", 0) and is_smooth(node, "Coat Roughness")
         return coated or is_smooth(node, "Roughness")
     return node.type in GLOSSY and is_smooth(node, "Roughness")
+
+
+def _lets_straight_through(node: bpy.types.Node) -> bool:
+    """Whether light goes through as if nothing were there, however rough it is."""
+    if node.type == "BSDF_PRINCIPLED":
+        if not is_above(node, "Transmission Weight", 0):
+            return False
+    elif node.type not in ("BSDF_GLASS", "BSDF_REFRACTION"):
+        return False
+    index = node.inputs["IOR"]
+    return index.is_linked or abs(index.default_value - 1) < BENDS
 
 
 def is_smooth(node: bpy.types.Node, name: str, below: float = SHARP) -> bool:

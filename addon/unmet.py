@@ -43,6 +43,9 @@ DIFFUSE = {
 }
 """Nodes with a shader that reflect evenly, or nothing themselves."""
 
+GIVING = {"NODES", "BOOLEAN"}
+"""Modifiers that may give a thing materials of others."""
+
 
 def unmet_steps(
     nodes: Iterable[bpy.types.Node], shown: Sequence[bpy.types.Object], sight: Sight | None
@@ -86,7 +89,7 @@ def _is_faint(node: bpy.types.Node) -> bool:
 def _are_worn_as_told(shown: Iterable[bpy.types.Object]) -> bool:
     """Whether things wear what their slots say, and nothing that modifiers give them."""
     return not any(
-        thing.instance_type != "NONE" or any(made.type == "NODES" for made in thing.modifiers)
+        thing.instance_type != "NONE" or any(made.type in GIVING for made in thing.modifiers)
         for thing in shown
     )
 

@@ -214,6 +214,64 @@ def test_a_little_lacquer_does_not_count(scene):
     assert needs_of(scene).unmet_width == pytest.approx(np.radians(30))
 
 
+@pytest.mark.parametrize(("index", "degrees"), [(1.0, 0), (1.05, 0), (1.45, 3)])
+@pytest.mark.parametrize("kind", ["ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction", None])
+def test_glass_that_does_not_bend_light_is_as_sharp_as_a_mirror(scene, kind, index, degrees):
+    """Cycles lets light straight through it, which is not looked for, however rough it is."""
+    made = material("New", (1, 1, 1), Roughness=0.5, Transmission_Weight=1.0, IOR=index)
+    if kind:
+        shader = made.node_tree.nodes.new(kind)
+        shader.inputs["Roughness"].default_value, shader.inputs["IOR"].default_value = 0.5, index
+        made.node_tree.nodes.remove(node(made.node_tree, "BSDF_PRINCIPLED"))
+    add_mesh(scene, plate_mesh(0.1), made, Matrix())
+    assert needs_of(scene).unmet_width == pytest.approx(np.radians(degrees))
+
+
+def test_lacquer_behind_what_one_sees_through_counts(scene):
+    matt, pane = material("New", (1, 1, 1), Roughness=0.4), material("Pane", (1, 1, 1), Alpha=0.5)
+    add_mesh(scene, box_mesh(0.1, 0.1, 0.2), matt, Matrix.Translation((0.4, 0, -0.1)))
+    add_mesh(scene, box_mesh(0.1, 0.1, 0.2), pane, Matrix.Translation((0.2, 0, -0.1)))
+    assert needs_of(scene).unmet_width == pytest.approx(np.radians(30))
+
+
+def test_a_mirror_that_appears_in_another_frame_counts(scene):
+    chrome = material("Chrome", (1, 1, 1), Metallic=1.0, Roughness=0.0)
+    mirror = add_mesh(scene, plate_mesh(0.1), chrome, Matrix())
+    mirror.hide_render = True
+    assert not needs_of(scene).mirrors
+    mirror.keyframe_insert("hide_render", frame=1)
+    mirror.hide_render = False
+    mirror.keyframe_insert("hide_render", frame=10)
+    scene.frame_set(1)
+    assert mirror.hide_render
+    needs = needs_of(scene)
+    assert needs.mirrors
+    assert needs.unmet_width == 0
+
+
+def test_keys_within_a_group_of_nodes_may_make_anything_of_it(scene):
+    group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+    shader = group.nodes.new("ShaderNodeBsdfPrincipled")
+    made = diffuse("New", 0.5)
+    made.node_tree.nodes.new("ShaderNodeGroup").node_tree = group
+    add_mesh(scene, plate_mesh(0.1), made, Matrix())
+    assert not needs_of(scene).mirrors
+    shader.inputs["Roughness"].keyframe_insert("default_value", frame=1)
+    assert needs_of(scene) == ALL
+
+
+def test_of_a_background_scene_all_is_needed(scene):
+    other = bpy.data.scenes.new("Other")
+    assert needs_of(scene) != ALL
+    scene.background_set = other
+    assert needs_of(scene) == ALL
+
+
+def test_a_volume_scatters_light_whatever_it_wears(scene):
+    scene.collection.objects.link(bpy.data.objects.new("V", bpy.data.volumes.new("V")))
+    assert needs_of(scene).fog
+
+
 def test_in_fog_suns_are_met(scene):
     fill_with_fog(scene)
     assert needs_of(scene).unmet_width == 0
