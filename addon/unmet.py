@@ -13,6 +13,7 @@ from collections.abc import Iterable, Sequence
 
 import bpy
 
+from .changes import SHAPELESS
 from .moments import Sight
 from .shaders import GLOSSY, is_above, is_sharp, is_smooth, nodes_of
 from .steps import Steps
@@ -51,13 +52,22 @@ def unmet_steps(
     nodes: Iterable[bpy.types.Node], shown: Sequence[bpy.types.Object], sight: Sight | None
 ) -> Steps[float]:
     """Angular diameter, in radians, of the widest suns that no ray in a scene need meet. nodes: of
-    all materials that its things, `shown`, may wear. sight: the scene for rays, if they tell."""
+    all materials that its things, `shown`, may wear. sight: the scene for rays, if they tell. In an
+    empty scene all are met: mirrors may come."""
+    if not any(map(_has_shape, shown)):
+        return 0.0
     width = min(map(unmet_width, nodes), default=ANY)
     if width != WIDE or sight is None or not _are_worn_as_told(shown):
         return width
     lacquered = {thing.name for thing in shown if any(map(_is_faint, _worn_by(thing)))}
     part = yield from sight.part_of_picture(lacquered)
     return ANY if part <= LITTLE else WIDE
+
+
+def _has_shape(thing: bpy.types.Object) -> bool:
+    if thing.type == "EMPTY":
+        return thing.instance_type != "NONE"
+    return thing.type not in SHAPELESS
 
 
 def unmet_width(node: bpy.types.Node) -> float:

@@ -113,6 +113,7 @@ def test_lamps_lie_in_their_collection_and_are_set_up_whole(scene, two_suns):
         assert lamp.visible_volume_scatter
         assert lamp.data.use_shadow
         assert lamp.data.exposure == 0
+        assert lamp.data.cycles.use_multiple_importance_sampling
     assert scene.world.sun_threshold == 0
 
 

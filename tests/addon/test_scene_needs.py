@@ -272,6 +272,16 @@ def test_a_volume_scatters_light_whatever_it_wears(scene):
     assert needs_of(scene).fog
 
 
+def test_in_an_empty_scene_suns_are_met(scene):
+    """What is put into their light later may be a mirror."""
+    assert needs_of(scene).unmet_width > 0
+    for thing in list(scene.objects):
+        if thing.type == "MESH":
+            bpy.data.objects.remove(thing)
+    scene.collection.objects.link(bpy.data.objects.new("Empty", None))
+    assert needs_of(scene).unmet_width == 0
+
+
 def test_in_fog_suns_are_met(scene):
     fill_with_fog(scene)
     assert needs_of(scene).unmet_width == 0
