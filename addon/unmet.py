@@ -32,7 +32,7 @@ MATT, WIDE = 0.4, math.radians(30.0)
 wide, but up to 1.7 times as noisy without those that meet wider ones."""
 
 LITTLE = 0.1
-"""Of a picture: so much of it may be so noisy, if all else is a tenth to a third calmer for it."""
+"""Of a picture: so much of it may be so noisy, as all else is calmer for it under most maps."""
 
 LACQUER = 1.5
 """Index of refraction up to which a gloss counts as faint."""
