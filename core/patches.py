@@ -58,7 +58,8 @@ class Patches(Memo):
 def patches_of(
     light: RegionLight, brightness: Floats, most: int = MOST_PATCHES, key: Hashable = None
 ) -> Patches:
-    """Patches of a light: about `most` of them, or its pixels where they are fewer.
+    """Patches of a light: about `most` of them, or its pixels where they are fewer; more where its
+    largest blocks alone are more than half as many.
 
     brightness: of each pixel of the light, (p,), at least 0. key: tells it from others of the same
     light, which is then not summed again for another number of patches. Only pixels that shine
@@ -71,11 +72,11 @@ def patches_of(
     if len(light.pixels) <= most:
         return _pixels(light, brightness)
     if key is None:
-        sums, peaks = _pyramid(light, brightness)
+        pyramid = _pyramid(light, brightness)
     else:
-        sums, peaks = light.latest("pyramid", key, lambda: _pyramid(light, brightness))
-    badness = [_squared(level) * 2.0**k for k, level in enumerate(sums, start=1)]
-    limit = _limit(badness, most)
+        pyramid = light.latest("pyramid", key, lambda: _pyramid(light, brightness))
+    sums, peaks, badness = pyramid.sums, pyramid.peaks, pyramid.badness
+    limit = pyramid.limit(most)
     found = []
     whole = np.ones(sums[-1].shape[:2], bool)
     for k in range(len(sums), 0, -1):
@@ -135,20 +136,6 @@ def _squared(sums: Floats) -> Floats:
     return (kinds**2).sum(axis=-1)
 
 
-def _limit(badness: list[Floats], most: int) -> float:
-    """Above this a block is divided, so that `most` patches come out: each division adds three.
-
-    A block is never better than one of its parts, so whatever is above has its parents above.
-    """
-    all_of_them = np.concatenate([level.ravel() for level in badness])
-    divisions = (most - np.count_nonzero(badness[-1])) // 3
-    if divisions <= 0:
-        return np.inf
-    if divisions >= len(all_of_them):
-        return 0.0
-    return float(np.partition(all_of_them, -divisions - 1)[-divisions - 1])
-
-
 def _blocks(
     sums: Floats, peaks: Floats, places: tuple[NDArray[np.intp], ...], k: int, light: RegionLight
 ) -> Patches:
@@ -163,12 +150,34 @@ def _blocks(
     return Patches(vector / length[:, None], sums[:, :3], spread, peaks, squares)
 
 
-def _pyramid(light: RegionLight, brightness: Floats) -> tuple[list[Floats], list[Floats]]:
-    """Sums and largest brightness over blocks of 2, 4, ... LARGEST_BLOCK pixels along a side.
+@dataclass(frozen=True, eq=False)
+class _Pyramid:
+    """Blocks of 2, 4, ... LARGEST_BLOCK pixels along a side: they reach over the map's end where
+    its size is no multiple, and hold nothing there.
 
-    Each (rows of blocks, columns of blocks, 7) and (rows, columns); blocks reach over the map's
-    end where its size is no multiple, and hold nothing there.
+    sums: (rows of blocks, columns of blocks, 7). peaks: the largest brightness, (rows, columns).
+    badness: what tells which are divided first, (rows, columns). worst: of all that are not 0.
     """
+
+    sums: list[Floats]
+    peaks: list[Floats]
+    badness: list[Floats]
+    worst: Floats
+
+    def limit(self, most: int) -> float:
+        """Above this a block is divided, so that `most` patches come out: each division adds three.
+
+        Half as many come out of divisions at least, however many blocks there are. A block is never
+        better than one of its parts, so whatever is above has its parents above.
+        """
+        divisions = max(most - np.count_nonzero(self.badness[-1]), most // 2) // 3
+        if divisions >= len(self.worst):
+            return 0.0
+        return float(np.partition(self.worst, -divisions - 1)[-divisions - 1])
+
+
+def _pyramid(light: RegionLight, brightness: Floats) -> _Pyramid:
+    """Of a light, with the brightness of each pixel."""
     tall = -(-light.height // LARGEST_BLOCK) * LARGEST_BLOCK // 2
     wide = -(-light.width // LARGEST_BLOCK) * LARGEST_BLOCK // 2
     rows, columns = np.divmod(light.pixels, light.width)
@@ -186,7 +195,8 @@ def _pyramid(light: RegionLight, brightness: Floats) -> tuple[list[Floats], list
         below = peaks[-1]
         pairs = np.maximum(below[::2], below[1::2])
         peaks.append(np.maximum(pairs[:, ::2], pairs[:, 1::2]))
-    return sums, peaks
+    badness = [_squared(level) * 2.0**k for k, level in enumerate(sums, start=1)]
+    return _Pyramid(sums, peaks, badness, np.concatenate([some[some > 0] for some in badness]))
 
 
 def _vectors(

@@ -35,8 +35,10 @@ CONES = np.radians([3, 50])
 NEAR = np.radians(10)
 """A wall's edge passes at most so far from what it is aimed at."""
 
-PIECES = 4096
-"""Points that stand for all discs together; each disc gets 32 to 1,024."""
+PIECES, FEWEST = 2048, 16
+"""Points that stand for all discs together, and for one of them at least. By light and the root of
+its width each disc gets its part: so shared out they tell the same errors as twice as many do, the
+same number for each."""
 
 AT_ONCE = 64
 """Pieces of light that are held against all surfaces at a time: few enough for a processor's own
@@ -199,29 +201,30 @@ def _parts(flux: Floats, seen: Floats) -> Floats:
 def _pieces(suns: Sequence[Sun]) -> tuple[Floats, Floats, Floats]:
     """Each sun, one at least, as points in a spiral over its disc: directions, luminous light and
     half widths."""
-    count = int(np.clip(PIECES // max(len(suns), 1), 32, 1024))
-    part = (np.arange(count) + 0.5) / count
-    turn = np.arange(count) * (np.pi * (3 - np.sqrt(5)))
-    across, up = np.cos(turn)[:, None], np.sin(turn)[:, None]
     axes = sphere.tangents(np.array([sun.to_light for sun in suns]))
+    light = np.array([sun.scalar_irradiance for sun in suns]) @ LUMINANCE_WEIGHTS
+    weight = light * np.sqrt([sun.angular_diameter for sun in suns])
+    parts = PIECES * weight / max(weight.sum(), 1e-300)
+    counts = np.maximum(np.round(parts).astype(int), FEWEST)
     found = []
-    for sun, first, second in zip(suns, *axes, strict=True):
-        light = float(sun.scalar_irradiance @ LUMINANCE_WEIGHTS)
+    for sun, whole, count, first, second in zip(suns, light, counts, *axes, strict=True):
         if sun.angular_diameter == 0:
-            found.append((sun.to_light[None], np.array([light]), np.array([SHARP])))
+            found.append((sun.to_light[None], np.array([whole]), np.array([SHARP])))
             continue
+        part = (np.arange(count) + 0.5) / count
+        turn = np.arange(count) * (np.pi * (3 - np.sqrt(5)))
         cap = 2 * np.sin(sun.angular_diameter / 4) ** 2  # 1 - cos of the half-angle
         along = 1 - part * cap
         aside = np.sqrt(1 - along**2)
         directions = (
             along[:, None] * sun.to_light
-            + aside[:, None] * across * first
-            + aside[:, None] * up * second
+            + (aside * np.cos(turn))[:, None] * first
+            + (aside * np.sin(turn))[:, None] * second
         )
         half = np.sqrt(2 * np.pi * cap / count) / 2
-        found.append((directions, np.full(count, light / count), np.full(count, half)))
-    directions, light, half = zip(*found, strict=True)
-    return np.concatenate(directions), np.concatenate(light), np.concatenate(half)
+        found.append((directions, np.full(count, whole / count), np.full(count, half)))
+    directions, given, half_width = (np.concatenate(arrays) for arrays in zip(*found, strict=True))
+    return directions, given, half_width
 
 
 def _around(targets: Floats, angles: Floats, turns: Floats) -> Floats:

@@ -23,9 +23,20 @@ BALANCED = 1.6
 """What is predicted of lights, about, against what is wrong of their cells when these are cut."""
 
 PER_LIGHT, FEWEST_PATCHES = 128, 2048
-"""Lights are made of so many patches. Where their number is looked for, twice as many give the same
-but for chance. As many as were asked for, 2 to 64 of them for nine maps, are by the geometric mean
-as wrong as of MOST_PATCHES to a hundredth, or up to 4 % less, and up to four times as soon made."""
+"""As many lights as were asked for are made of so many patches. 2 to 64 of them for nine maps are
+by the geometric mean as wrong as of MOST_PATCHES to a hundredth, or up to 4 % less, and up to four
+times as soon made."""
+
+SEARCHED_PER_LIGHT, FEWEST_SEARCHED = 64, 512
+"""The same where their number is looked for. 2 to 24 lights are as wrong of 512 patches as of
+MOST_PATCHES, but for chance: 1.00 times by the geometric mean of 27 regions of nine maps."""
+
+TOLD_BY = 4096
+"""Patches by which errors are predicted: as far from what many more tell as MOST_PATCHES are, as
+both are good to a tenth only."""
+
+HOPELESS = 1.25
+"""So many are too few if the first cells for them are this much more wrong than is allowed."""
 
 
 def choose_suns(
@@ -44,7 +55,7 @@ def choose_suns(
     if not len(light.pixels):
         error = Prediction.of(None, strata.light, rest, eevee).error(()) if rest else 0.0
         return ChosenSuns((), error, (NO_SUN,) if settings.share is None else (), 0.0)
-    patches = _patches(light, strata, MOST_PATCHES)
+    patches = _patches(light, strata, TOLD_BY)
     prediction = light.latest(
         "prediction",
         (strata, rest, eevee),
@@ -77,7 +88,7 @@ def _as_many_as_help(
     do better still: what cells get wrong is added up cell by cell, and what wide discs get wrong
     together can be more than that, or less."""
     count = settings.most_lights
-    patches = _patches(light, strata, _enough_patches(count))
+    patches = _patches(light, strata, _for_lights(count, PER_LIGHT, FEWEST_PATCHES))
     best = _judged(edge_suns(patches, strata, settings, count), prediction, strata)
     while 1 < len(best.suns) < count:
         count = len(best.suns) // 2 + 1
@@ -96,7 +107,7 @@ def _fewest_by_edge(
     allowed: float,
 ) -> ChosenSuns:
     """As few as are within a part of the mean irradiance."""
-    rough = split_of(_patches(light, strata, FEWEST_PATCHES), settings.shape)
+    rough = split_of(_patches(light, strata, FEWEST_SEARCHED), settings.shape)
     share = float(light.luminous_flux.sum()) / strata.light
 
     def expected(count: int) -> float:
@@ -104,17 +115,27 @@ def _fewest_by_edge(
 
     likely = first_guess(allowed, settings.most_lights, expected)
     # The same for all numbers, so that they share their cuts.
-    patches = _patches(light, strata, _enough_patches(likely))
+    enough = _for_lights(likely, SEARCHED_PER_LIGHT, FEWEST_SEARCHED)
+    patches = _patches(light, strata, enough)
 
-    def with_lights(count: int) -> ChosenSuns:
-        chosen = edge_suns(patches, strata, settings, count, level=True)
+    def of_cells(count: int, rough: bool) -> ChosenSuns:
+        chosen = edge_suns(patches, strata, settings, count, level=True, rough=rough)
         chosen = _judged(chosen, prediction, strata)
         if chosen.worst <= allowed or chosen.worst == chosen.predicted_error:
             return chosen
         level = replace(chosen, suns=levelled(chosen.suns, prediction.ground))
         return min(chosen, _judged(level, prediction, strata), key=lambda one: one.worst)
 
-    return fewest(with_lights, allowed, settings.most_lights, expected)
+    def with_lights(count: int) -> ChosenSuns:
+        rough = of_cells(count, rough=True)
+        if not allowed < rough.worst <= HOPELESS * allowed:
+            return rough
+        return min(rough, of_cells(count, rough=False), key=lambda one: one.worst)
+
+    found = fewest(with_lights, allowed, settings.most_lights, expected)
+    if found.worst > allowed:
+        return found
+    return min(found, of_cells(len(found.suns), rough=False), key=lambda one: one.worst)
 
 
 def _judged(chosen: ChosenSuns, prediction: Prediction, strata: Strata) -> ChosenSuns:
@@ -126,9 +147,9 @@ def _judged(chosen: ChosenSuns, prediction: Prediction, strata: Strata) -> Chose
     )
 
 
-def _enough_patches(count: int) -> int:
-    """For so many lights; a power of two."""
-    return int(np.clip(PER_LIGHT << (count - 1).bit_length(), FEWEST_PATCHES, MOST_PATCHES))
+def _for_lights(count: int, per_light: int, least: int) -> int:
+    """Patches that so many lights are made of; a power of two."""
+    return int(np.clip(per_light << (count - 1).bit_length(), least, MOST_PATCHES))
 
 
 def _patches(light: RegionLight, strata: Strata, most: int) -> Patches:

@@ -81,9 +81,10 @@ def judged(light: EdgeLight, cells: PatchCells) -> PatchCells:
     owner = cells.owner[order]
     found = []
     for first in range(0, len(cells.held), CELLS):
-        held = cells.held[first : first + CELLS]
-        some = slice(*np.searchsorted(owner, (first, first + len(held))))
-        found.append(_wrong(light, order[some], owner[some] - first, held))
+        some = slice(first, first + CELLS)
+        mine = slice(*np.searchsorted(owner, (first, first + CELLS)))
+        discs = cells.held[some], cells.to_light[some], cells.shortfall[some]
+        found.append(_wrong(light, order[mine], owner[mine] - first, *discs))
     wrong, on_ground = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return replace(cells, wrong=wrong, on_ground=on_ground)
 
@@ -95,7 +96,7 @@ def squared_errors(light: EdgeLight, members: Owner, owner: Owner, count: int) -
     members: patches, (m,), with the cell of each, rising from 0: every cell has one.
     """
     held = sums_of(owner, light.held.take(members, axis=0), count)
-    return _wrong(light, members, owner, held)[0]
+    return _wrong(light, members, owner, held, *light.moments(held, members, owner))[0]
 
 
 def widths(light: EdgeLight, members: Owner, owner: Owner, count: int) -> Floats:
@@ -108,15 +109,20 @@ def widths_of(light: EdgeLight, held: Floats) -> Floats:
     return held[:, TOTAL] ** 2 * np.sqrt(light.shortfalls(held))[:, None]
 
 
-def _wrong(light: EdgeLight, members: Owner, owner: Owner, held: Floats) -> tuple[Floats, Floats]:
-    """See `squared_errors`, and `PatchCells.on_ground`. held: what each cell holds of it all,
-    (n, HELD)."""
-    to_light, shortfall = light.moments(held, members, owner)
+def _wrong(
+    light: EdgeLight,
+    members: Owner,
+    owner: Owner,
+    held: Floats,
+    to_light: Floats,
+    shortfall: Floats,
+) -> tuple[Floats, Floats]:
+    """See `squared_errors`, and `PatchCells` for what cells hold and where their discs are."""
     half = np.zeros(len(held))
     if light.shape == "disc":
         half = disc_diameter(shortfall) / 2
     parts = light.judged.take(members, axis=0)
-    directions = light.patches.directions.take(members, axis=0)
+    directions = light.directions.take(members, axis=0)
     half_width = light.half_width.take(members)
     edges = edges_across(directions, half_width, parts, owner, to_light, TURNS, PLACES)
     of_disc = cap_beyond(edges.height, half[:, None])

@@ -36,7 +36,7 @@ class Cuts:
 
     def __init__(self, light: EdgeLight, measure: Measure) -> None:
         self._light, self._measure = light, measure
-        self._owner = np.zeros(len(light.patches), np.intp)
+        self._owner = np.zeros(len(light), np.intp)
         self._parents = [0]
         self.ends = [1]
         self._wrong: list[Floats] = []

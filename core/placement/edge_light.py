@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -42,66 +43,55 @@ HELD = SEEN.stop
 class EdgeLight:
     """Patches with what cutting and balancing ask of them.
 
-    part: 0 or 1 for each patch, (p,). How much a colour counts is by the light of the same part:
-    against the whole map's red, that of a sky under a red sun is next to nothing.
+    directions: unit vectors, (p, 3). half_width: see `shadow_edges.half_widths`, (p,). part: of the
+    light that each is of, 0 or 1, (p,). relative: red, green and blue as parts of the red, green
+    and blue of that part, times how much of all light is in it, (p, 3): against the whole map's
+    red, that of a sky under a red sun is next to nothing. held: all that is asked of cells in sums
+    over their patches, (p, HELD): flux; what is `relative`; the mean direction times each of that;
+    red, blue and luminance as parts of all of each; and what level ground gets of that.
     """
 
-    patches: Patches
     shape: Shape
+    directions: Floats
+    half_width: Floats
     part: Owner
+    relative: Floats
+    held: Floats
 
     @classmethod
-    def of(cls, patches: Patches, shape: Shape) -> EdgeLight:
-        """All in one part."""
-        return cls(patches, shape, np.zeros(len(patches), np.intp))
+    def of(cls, patches: Patches, shape: Shape, part: Owner | None = None) -> EdgeLight:
+        """All in one part, if none are given."""
+        if part is None:
+            part = np.zeros(len(patches), np.intp)
+        half_width = half_widths(patches.spread)
+        relative = _relative(patches.flux, part)
+        mean = (1 - patches.spread)[:, None] * patches.directions
+        vectors = relative[:, :, None] * mean[:, None, :]
+        judged = _judged(patches.flux)
+        seen = judged * facing_up(patches.directions, half_width)[:, None]
+        sums = [patches.flux, relative, vectors.reshape(-1, 9), judged, seen]
+        held = np.concatenate(sums, axis=1)
+        return cls(shape, patches.directions, half_width, part, relative, held)
 
-    def in_two_parts(self) -> EdgeLight:
-        """Bright and faint: the border is the mean brightness, in octaves, of where light is. The
-        same as before if one of them has next to nothing of it."""
-        luminous = self.patches.flux @ LUMINANCE_WEIGHTS
-        luminous /= luminous.sum()
-        octaves = np.log2(np.maximum(self.patches.brightness, 1e-300))
-        bright = octaves > weighted_sum(luminous, octaves)
-        if not A_PART < luminous[bright].sum() < 1 - A_PART:
-            return self
-        return replace(self, part=bright.astype(np.intp))
+    @classmethod
+    def joined(cls, lights: Sequence[EdgeLight]) -> EdgeLight:
+        """Side by side."""
+        names = ("directions", "half_width", "part", "relative", "held")
+        arrays = (np.concatenate([getattr(one, name) for one in lights]) for name in names)
+        return cls(lights[0].shape, *arrays)
 
-    @cached_property
-    def relative(self) -> Floats:
-        """Red, green and blue of each patch, as parts of the red, green and blue of its own part of
-        the light, times that part, (p, 3)."""
-        total = sums_of(self.part, self.patches.flux, int(self.part.max()) + 1)
-        shares = total @ LUMINANCE_WEIGHTS / (total @ LUMINANCE_WEIGHTS).sum()
-        scale = shares[:, None] / np.where(total > 0, total, 1)
-        return self.patches.flux * scale[self.part]
+    def __len__(self) -> int:
+        return len(self.part)
 
-    @cached_property
+    @property
     def judged(self) -> Floats:
         """Red, blue and luminance of each patch, as parts of all of each, (p, 3)."""
-        flux = self.patches.flux
-        kinds = np.stack([flux[:, 0], flux[:, 2], flux @ LUMINANCE_WEIGHTS], axis=-1)
-        total = kinds.sum(axis=0)
-        return kinds / np.where(total > 0, total, 1)
+        return self.held[:, TOTAL]
 
     @cached_property
     def light(self) -> Floats:
         """Of each patch as a part of all light, (p,)."""
         return self.relative @ SEEN_BY / SEEN_BY.sum()
-
-    @cached_property
-    def held(self) -> Floats:
-        """All that is asked of cells in sums over their patches, (p, HELD): flux; what is
-        `relative`; the mean direction times each of that; what is `judged`; and what level ground
-        gets of that. One product of matrices sums them all."""
-        mean = (1 - self.patches.spread)[:, None] * self.patches.directions
-        vectors = self.relative[:, :, None] * mean[:, None, :]
-        seen = self.judged * facing_up(self.patches.directions, self.half_width)[:, None]
-        parts = [self.patches.flux, self.relative, vectors.reshape(-1, 9), self.judged, seen]
-        return np.concatenate(parts, axis=1)
-
-    @cached_property
-    def half_width(self) -> Floats:
-        return half_widths(self.patches.spread)
 
     def halves(self, members: Owner) -> NDArray[np.bool_] | None:
         """Which members come first if a cell is cut at its mean, across its longest axis, or
@@ -111,7 +101,7 @@ class EdgeLight:
         part = self.part[members] > 0
         if part.any() and not part.all():
             return part
-        directions = self.patches.directions.take(members, axis=0)
+        directions = self.directions.take(members, axis=0)
         relative = self.relative.take(members, axis=0)
         weight = relative @ (SEEN_BY * relative.sum(axis=0))
         offset = directions - weighted_sum(weight, directions) / weight.sum()
@@ -131,7 +121,7 @@ class EdgeLight:
         for cell in np.flatnonzero(lost):
             mine = members[owner == cell]
             brightest = np.argmax(self.relative[mine] @ (SEEN_BY * held[cell, RELATIVE]))
-            to_light[cell] = self.patches.directions[mine[brightest]]
+            to_light[cell] = self.directions[mine[brightest]]
         return to_light, np.maximum(1 - length / total, 0)
 
     def shortfalls(self, held: Floats) -> Floats:
@@ -148,6 +138,33 @@ class EdgeLight:
         shares = SEEN_BY * held[:, RELATIVE]
         total = (shares * held[:, RELATIVE]).sum(axis=1)
         return np.einsum("nc,nca->na", shares, held[:, VECTORS].reshape(-1, 3, 3)), total
+
+
+def two_parts(patches: Patches) -> Owner | None:
+    """Which patches are bright, 1, or faint, 0, (p,): the border is the mean brightness, in
+    octaves, of where light is. None if one of them has next to nothing of it."""
+    luminous = patches.flux @ LUMINANCE_WEIGHTS
+    luminous /= luminous.sum()
+    octaves = np.log2(np.maximum(patches.brightness, 1e-300))
+    bright = octaves > weighted_sum(luminous, octaves)
+    if not A_PART < luminous[bright].sum() < 1 - A_PART:
+        return None
+    return bright.astype(np.intp)
+
+
+def _relative(flux: Floats, part: Owner) -> Floats:
+    """See `EdgeLight.relative`."""
+    total = sums_of(part, flux, int(part.max()) + 1)
+    shares = total @ LUMINANCE_WEIGHTS / (total @ LUMINANCE_WEIGHTS).sum()
+    scale = shares[:, None] / np.where(total > 0, total, 1)
+    return flux * scale[part]
+
+
+def _judged(flux: Floats) -> Floats:
+    """See `EdgeLight.judged`."""
+    kinds = np.stack([flux[:, 0], flux[:, 2], flux @ LUMINANCE_WEIGHTS], axis=-1)
+    total = kinds.sum(axis=0)
+    return kinds / np.where(total > 0, total, 1)
 
 
 def sums_of(owner: Owner, values: Floats, count: int) -> Floats:

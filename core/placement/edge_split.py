@@ -9,17 +9,19 @@ the best of all is taken.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from ..patches import Patches
 from ..settings import Shape
-from .edge_balance import TOGETHER, Balance
-from .edge_cells import PatchCells, cells_of, error_of, judged, squared_errors, widths
+from .edge_balance import Trial, balanced
+from .edge_cells import PatchCells, cells_of, error_of, squared_errors, widths
 from .edge_cuts import Cuts
 from .edge_exchange import exchanged, filled
-from .edge_light import EdgeLight, Owner
+from .edge_light import EdgeLight, two_parts
 
 FIRST, MORE = 8, 4
 """How often borders are shared out before cells are judged: at first, and after other changes.
@@ -39,47 +41,27 @@ among lights of strong colours cells tear each other apart."""
 
 
 LAST = 8
-"""Of so many numbers of cells the last ones are kept: an eighth of a megabyte each at most."""
+"""Of so many numbers of cells the last ones are kept."""
 
-
-@dataclass(frozen=True, eq=False)
-class _Trial:
-    """Cells on their way. together: see `edge_balance.TOGETHER`."""
-
-    balance: Balance
-    cells: PatchCells
-    together: float = TOGETHER
-
-    def after(self, steps: int) -> _Trial:
-        """With borders shared out so many times, and judged."""
-        cells = self.balance.after(self.cells, steps, self.together)
-        return replace(self, cells=judged(self.balance.light, cells))
-
-    def moved(self, count: int) -> _Trial:
-        """With the worst cells cut and others joined: `count` cells."""
-        return replace(self, cells=exchanged(self.balance.light, self.cells, count))
-
-    def drawn(self, times: float) -> _Trial:
-        """With colours drawn together by so many times as much from now on."""
-        return replace(self, together=times * self.together)
-
-    def filled(self, count: int) -> list[_Trial]:
-        """With cells in the place of lost ones, if any are."""
-        if len(self.cells.held) >= count:
-            return []
-        more = filled(self.balance.light, self.cells, count)
-        return [replace(self, cells=more).after(0)]
+Key, Made = TypeVar("Key"), TypeVar("Made")
 
 
 def edge_split(
-    patches: Patches, count: int, shape: Shape, allowed: float = 0.0, level: bool = False
+    patches: Patches,
+    count: int,
+    shape: Shape,
+    allowed: float = 0.0,
+    level: bool = False,
+    rough: bool = False,
 ) -> PatchCells:
     """At most `count` cells: as many as make the predicted error smaller, until it is `allowed`.
 
     patches: some, all of them lit. allowed: a part of all light; see `PatchCells.error`. level:
-    whether they are chosen by `PatchCells.level_error` instead.
+    whether they are chosen by `PatchCells.level_error` instead. rough: of the first round, in less
+    than half the time; half of all are wrong by less than a fiftieth more.
     """
-    return split_of(patches, shape).cells(count, allowed, level)
+    split = split_of(patches, shape)
+    return split.rough(count, allowed, level) if rough else split.cells(count, allowed, level)
 
 
 def split_of(patches: Patches, shape: Shape) -> EdgeSplit:
@@ -94,56 +76,66 @@ class EdgeSplit:
     """
 
     def __init__(self, patches: Patches, shape: Shape) -> None:
-        whole = EdgeLight.of(patches, shape)
-        parts = whole.in_two_parts()
-        self.patches = patches
-        self._whole, self._truest = whole, Cuts(parts, squared_errors)
-        lights = (whole,) if parts is whole else (whole, parts)
-        self._last: dict[tuple[int, bool], PatchCells] = {}
-        self._beginnings = [(Balance(light), Cuts(light, widths)) for light in lights]
+        lights, part = [EdgeLight.of(patches, shape)], two_parts(patches)
+        if part is not None:
+            lights.append(EdgeLight.of(patches, shape, part))
+        self._whole, self._truest = lights[0], Cuts(lights[-1], squared_errors)
+        self._first: dict[tuple[int, bool], list[Trial]] = {}
+        self._best: dict[tuple[int, bool], PatchCells] = {}
+        self._beginnings = [(light, Cuts(light, widths)) for light in lights]
 
     def cells(self, count: int, allowed: float = 0.0, level: bool = False) -> PatchCells:
         """See `edge_split`."""
+        enough = self._enough(count, allowed)
+        # Often another number that is asked for comes to the same.
+        return _kept(self._best, (enough, level), lambda: self._balanced(enough, level).cells)
 
-        made = self._enough(count, allowed), level
-        if made not in self._last:  # often another number that is asked for comes to the same
-            if len(self._last) == LAST:
-                del self._last[next(iter(self._last))]
-            self._last[made] = self._balanced(*made)
-        return self._last[made]
+    def rough(self, count: int, allowed: float = 0.0, level: bool = False) -> PatchCells:
+        """See `edge_split`."""
+        first = self._first_round(self._enough(count, allowed), level)
+        return min(first, key=_by_error(level)).cells
 
-    def _balanced(self, enough: int, level: bool) -> PatchCells:
+    def _balanced(self, enough: int, level: bool) -> Trial:
         """The best of `enough` cells that were tried."""
-
-        def error(trial: _Trial) -> float:
-            return trial.cells.level_error if level else trial.cells.error
-
-        owner = self._truest.owner(enough)
-        cut = _Trial(self._beginnings[0][0], cells_of(self._whole, owner)).after(0)
-        if enough == 1:
-            return cut.cells
-        first = []
-        for trial in self._begun(owner, enough):
-            first.append(trial.after(FIRST))
-            if error(first[-1]) > error(cut):
-                first.append(trial.drawn(GENTLER).after(FIRST))
-        tried, best = first, cut
-        for _ in range(2):
+        error = _by_error(level)
+        cut, *tried = self._first_round(enough, level)
+        best = cut
+        for _ in range(2 if tried else 0):
             tried = sorted(tried, key=error)[:GO_ON]
             best = min([best, *tried], key=error)
-            ways = [way for one in tried for way in (one.moved(enough), one.drawn(STRONGER))]
-            tried = [way.after(MORE) for way in ways]
+            ways = []
+            for one in tried:
+                moved = replace(one, cells=exchanged(one.light, one.cells, enough))
+                ways += [moved, replace(one, together=STRONGER * one.together)]
+            tried = balanced(ways, MORE)
         best = min([best, *tried], key=error)
-        return min([best, *best.filled(enough)], key=error).cells
+        if len(best.cells.held) >= enough:
+            return best
+        more = replace(best, cells=filled(best.light, best.cells, enough))
+        return min([best, *balanced([more], 0)], key=error)
 
-    def _begun(self, owner: Owner, count: int) -> list[_Trial]:
-        """From different beginnings. owner: of the cells that are cut by predicted error, (p,)."""
+    def _first_round(self, enough: int, level: bool) -> list[Trial]:
+        """`enough` cells as they are cut, and more from different beginnings."""
+        return _kept(self._first, (enough, level), lambda: self._begun(enough, level))
+
+    def _begun(self, count: int, level: bool) -> list[Trial]:
+        """See `_first_round`."""
+        error, owner = _by_error(level), self._truest.owner(count)
+        [cut] = balanced([Trial(self._whole, cells_of(self._whole, owner))], 0)
+        if count == 1:
+            return [cut]
         begun = []
-        for balance, widest in self._beginnings:
+        for light, widest in self._beginnings:
             widest.grow(count)
             for one in (owner, widest.owner(min(count, widest.count))):
-                begun.append(_Trial(balance, cells_of(balance.light, one)))
-        return begun
+                begun.append(Trial(light, cells_of(light, one)))
+        tried = balanced(begun, FIRST)
+        worse = [
+            replace(before, together=GENTLER * before.together)
+            for before, after in zip(begun, tried, strict=True)
+            if error(after) > error(cut)
+        ]
+        return [cut, *tried, *(balanced(worse, FIRST) if worse else [])]
 
     def error_of_cuts(self, count: int) -> float:
         """About what so many cells get wrong: before they are balanced; see `PatchCells.error`."""
@@ -162,3 +154,16 @@ class EdgeSplit:
             wrong = wrong[: np.argmax(within) + 1]
         # A round sun cut in two is two bad halves.
         return int(numbers[np.argmin(wrong.sum(axis=1))])
+
+
+def _by_error(level: bool) -> Callable[[Trial], float]:
+    return lambda one: one.cells.level_error if level else one.cells.error
+
+
+def _kept(kept: dict[Key, Made], key: Key, make: Callable[[], Made]) -> Made:
+    """The same as the last time for the LAST keys."""
+    if key not in kept:
+        if len(kept) == LAST:
+            del kept[next(iter(kept))]
+        kept[key] = make()
+    return kept[key]

@@ -30,7 +30,7 @@ def light() -> EdgeLight:
 
 def cut_badly(light: EdgeLight):
     """The first in eight parts, the second whole."""
-    directions = light.patches.directions
+    directions = light.directions
     in_second = directions @ SECOND > directions @ FIRST
     azimuth = np.degrees(np.arctan2(directions[:, 1], directions[:, 0]))
     eighth = np.clip((azimuth // 5).astype(int), 0, 7)
@@ -59,13 +59,13 @@ def test_lost_cells_come_back(light):
 
 
 def test_a_single_patch_is_not_cut(light):
-    owner = np.arange(len(light.patches))
+    owner = np.arange(len(light))
     cells = judged(light, cells_of(light, owner))
     assert len(filled(light, cells, len(owner) + 5).flux) == len(owner)
     assert len(exchanged(light, cells, len(owner)).flux) == len(owner)
 
 
 def test_two_cells_have_none_to_give(light):
-    directions = light.patches.directions
+    directions = light.directions
     cells = judged(light, cells_of(light, (directions @ SECOND > directions @ FIRST).astype(int)))
     assert exchanged(light, cells, 2) is cells

@@ -74,8 +74,8 @@ def two_suns_and_a_sky():
 def test_fewer_patches_find_about_as_many_lights(sunrise, monkeypatch, real, share):
     settings = ConversionSettings(share=share, tolerance=1.0)
     made = []
-    for fewest_patches in (choice.FEWEST_PATCHES, choice.MOST_PATCHES):
-        monkeypatch.setattr(choice, "FEWEST_PATCHES", fewest_patches)
+    for fewest_patches in (choice.FEWEST_SEARCHED, choice.MOST_PATCHES):
+        monkeypatch.setattr(choice, "FEWEST_SEARCHED", fewest_patches)
         found = load(sunrise) if real else two_suns_and_a_sky()
         conversion = convert(found, settings)
         assert wrong(conversion) <= 0.01
