@@ -24,8 +24,9 @@ from .known import known_file, known_map
 from .steps import Apart, Steps
 from .trace import TAG
 
-UNCOMPRESSED = 1024
-"""Pixels of a map's width up to which it is packed as it is: 6 MB at most."""
+UNCOMPRESSED, UNROUNDED = 1024, 512
+"""Pixels of a map's width up to which it is packed uncompressed, as half floats where these are
+enough, 6 MB at most; and up to which it is packed as float32, 1.5 MB."""
 
 LINEAR_SPACES = ("Linear ", "Non-Color", "ACEScg", "ACES2065-1", "scene_linear")
 """How the names of colour spaces begin in which numbers are light."""
@@ -187,7 +188,8 @@ def write_map(folder: Path, kind: str, radiance: Radiance) -> Path:
             half = exr.halved(radiance.residual) is not None
             exr.write_strips(path, radiance, half)
         else:  # small maps are written often, and as fast as may be
-            exr.write(path, radiance, compressed=radiance.shape[1] > UNCOMPRESSED)
+            width = radiance.shape[1]
+            exr.write(path, radiance, width > UNCOMPRESSED, width > UNROUNDED)
     except OSError as error:
         raise CannotWrite(
             f"Cannot write the {kind} map into a temporary folder: {error.strerror}."

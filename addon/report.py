@@ -62,14 +62,14 @@ def skipped_sentences(
 ) -> list[str]:
     """What was left out, and why. settings: as the user has them."""
     lines = looked_sentences(needs)
-    own, width = conversion.environment.own_width, conversion.settings.residual_width
+    own, width = conversion.environment.own_width, conversion.width_that_lights
     if conversion.invisible_part > LEAST_SAID:
         text = said(
             "Skipped: {part:.1%} of the light reaches nothing that the camera shows: no lamps for "
             "it, it stays in the world."
         )
         lines.append(text.format(part=conversion.invisible_part))
-    if conversion.residual is not None and width not in (settings.residual_width, "own"):
+    if settings.residual_width is None and width is not None and width < own:
         coarse = said(
             "Skipped: the camera is too coarse for more, so the world that lights is {width} "
             "pixels wide instead of {own}."

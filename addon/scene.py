@@ -186,13 +186,16 @@ def _without_excess(
     settings: ConversionSettings, width: int, needs: SceneNeeds
 ) -> ConversionSettings:
     """With a residual so wide that nothing could tell it from one as wide as the map, and none for
-    mirrors where there are none."""
+    mirrors where there are none. A Voronoi map is made of as many pixels as samples are drawn
+    from."""
     if settings.in_eevee:
         settings = replace(settings, mirrors=needs.mirrors)
     if settings.residual_width is not None:
         return settings
-    narrower = needs.residual_width(width)
-    return replace(settings, residual_width="own" if narrower == width else narrower)
+    enough = needs.residual_width(width)
+    if enough == "lighting" and settings.residual == "voronoi":
+        return settings
+    return replace(settings, residual_width=enough)
 
 
 def _add_pass(scene: bpy.types.Scene, conversion: Conversion, other_lights: bool) -> list[str]:

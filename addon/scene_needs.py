@@ -10,7 +10,8 @@ from dataclasses import dataclass, field, replace
 
 import bpy
 
-from ..core.environment import whole_part, whole_part_from
+from ..core.environment import whole_part_from
+from ..core.settings import ResidualWidth
 from .moments import Panes, Sight, sight_of
 from .ordinary import is_all_met, is_seen_as_rendered, shown_things
 from .rig import guards_of, rig_of
@@ -19,9 +20,9 @@ from .steps import Steps, run_at_once
 from .unmet import unmet_steps
 from .views import finest_width, is_ordinary, view_of
 
-LIGHTING_WIDTH = 1024
-"""Pixels of a map that only lights: without its suns nothing in it is narrower than a third of a
-degree, as far as rougher surfaces and shadows can tell."""
+MIRRORED_WIDTH = 1024
+"""Pixels of a map that something mirrors, at least, however coarse the camera is: a curved mirror
+shows more of it in each of a picture's pixels, some of them less."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +48,14 @@ class SceneNeeds:
         """Of the map that the camera sees, for a map of this width."""
         return whole_part_from(width, self.camera_width) if self.camera_width else width
 
-    def residual_width(self, width: int) -> int:
+    def residual_width(self, width: int) -> ResidualWidth:
         """Of the map that lights, for a map of this width."""
         if not self.mirrors:
-            return whole_part(width, LIGHTING_WIDTH)
+            return "lighting"
         if self.camera_width is None:
-            return width
-        return whole_part_from(width, max(self.camera_width, LIGHTING_WIDTH))
+            return "own"
+        narrower = whole_part_from(width, max(self.camera_width, MIRRORED_WIDTH))
+        return narrower if narrower < width else "own"
 
 
 ALL = SceneNeeds(camera_sees_world=True, mirrors=True, other_lights=True)

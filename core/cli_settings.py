@@ -187,8 +187,8 @@ def _add_rest(group: argparse._ArgumentGroup) -> None:
         "--residual-width",
         type=_residual_width,
         metavar="PIXELS",
-        help='a whole part of the map\'s width, or "own" for all of it, which mirrors and '
-        "backgrounds show (default: as many as light needs, about 1024)",
+        help='a whole part of the map\'s width, "own" for all of it, which mirrors and backgrounds '
+        'show, or "lighting" for as few as light needs (default: about 1024)',
     )
     group.add_argument(
         "--residual-samples",
@@ -206,10 +206,10 @@ def _count(text: str) -> int:
 
 
 def _residual_width(text: str) -> ResidualWidth:
-    if text == "own":
-        return "own"
+    if text == "own" or text == "lighting":
+        return text
     if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is neither own nor a number from 1 up")
+        raise argparse.ArgumentTypeError(f"{text!r} is no number from 1 up, own or lighting")
     return int(text)
 
 

@@ -57,6 +57,13 @@ class Conversion:
         return float(self.account.suns @ LUMINANCE_WEIGHTS) / self.strata.light
 
     @property
+    def width_that_lights(self) -> int | None:
+        """Of the whole residual, None without one."""
+        if self.residual is None:
+            return None
+        return self.levelled.width if self.levelled else self.residual.shape[1]
+
+    @property
     def invisible_part(self) -> float:
         """Of all luminance, what reaches nothing that is looked at."""
         if self.visible is None:
@@ -95,7 +102,8 @@ def convert(
     residual, levelled, samples = None, None, None
     notes = (*_share_note(strata, settings), *notes, *chosen.notes)
     if settings.leaves_residual:
-        residual, levelled = residual_of(environment, light, settings.residual_width)
+        seen = strata.light / float(environment.scalar_irradiance @ LUMINANCE_WEIGHTS)
+        residual, levelled = residual_of(environment, light, settings.residual_width, seen)
         if settings.residual == "voronoi":
             samples, more = map_of_samples(residual, settings)
             residual, levelled, notes = samples.radiance, None, notes + more

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from . import sphere
 from .environment import EnvironmentMap, check_part
+from .lighting_width import lighting_width
 from .pixels import HeldPixels, Planes, Strip, planes_of
 from .reduction import narrowed
 from .region import RegionLight
@@ -30,16 +31,18 @@ def without(environment: EnvironmentMap, light: RegionLight) -> NDArray[np.float
 
 
 def residual_of(
-    environment: EnvironmentMap, light: RegionLight, width: ResidualWidth
+    environment: EnvironmentMap, light: RegionLight, width: ResidualWidth, seen: float = 1.0
 ) -> tuple[NDArray[np.float32], LevelledPixels | None]:
     """The map less some light, (w // 2, w, 3); and with all pixels of a wide map, if these are
     asked for.
 
-    width: None for that of the map that is looked at. Raises UnusableInput where it is no whole
-    part of the map's own.
+    width: None for that of the map that is looked at. seen: part of the map's light that reaches
+    what is looked at. Raises UnusableInput where the width is no whole part of the map's own.
     """
     residual = without(environment, light)
     own = environment.own_width
+    if width == "lighting":
+        width = lighting_width(residual, environment.scalar_irradiance * seen)
     width = {None: environment.width, "own": own}.get(width, width)
     if width == environment.width:
         return residual, None

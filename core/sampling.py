@@ -80,7 +80,9 @@ def choose_sampling(
         return WorldSampling("NONE")
     if cells:
         return WorldSampling("MANUAL", min(residual.shape[1], WIDEST_TABLE))
-    return WorldSampling("AUTOMATIC" if peak > CALM_PEAK else "MANUAL")
+    if peak > CALM_PEAK:
+        return WorldSampling("AUTOMATIC")
+    return WorldSampling("MANUAL", min(residual.shape[1], SMALL_TABLE))
 
 
 def needs_light_tree(suns: Sequence[Sun], light: float, beside: float = 0.0) -> bool:

@@ -13,7 +13,7 @@ Position = Literal["centroid", "sample"]
 Frequency = Literal["one", "energy", "mean"]
 """F of the paper: 1; the integral of L over the sample's cell; that by the cell's area."""
 ResidualKind = Literal["map", "voronoi", "none"]
-ResidualWidth = int | Literal["own"] | None
+ResidualWidth = int | Literal["own", "lighting"] | None
 Fill = Literal["surroundings", "black"]
 Target = Literal["cycles", "eevee", "both", "export"]
 
@@ -64,8 +64,9 @@ class ConversionSettings:
     frequency: what weighs samples that are clustered (paper, section 3): "one", the "energy" of
         their cells or its "mean" over the cell.
     residual: "map", a "voronoi" map of samples (paper, 2.3), or "none": leave the rest out.
-    residual_width: pixels, a whole part of the map's width, "own" for all of them, or None: as
-        many as light needs, about 1,024; mirrors and backgrounds may show that it is not sharp.
+    residual_width: pixels, a whole part of the map's width, "own" for all of them, "lighting" for
+        as few as shadows and rough surfaces need, see `lighting_width`, or None: about 1,024;
+        mirrors and backgrounds may show that it is not sharp.
     residual_samples: how many samples a Voronoi map is made of.
     mirrors: whether something may show the residual sharply. Where nothing does, suns in EEVEE may
         hold all light, as what is left would be without shadows.
@@ -102,7 +103,7 @@ class ConversionSettings:
             raise BadSetting(f"share must be 0 to 1, not {self.share:g}.")
         if self.strata < 2 or self.strata % 2:
             raise BadSetting(f"strata must be an even number from 2 up, not {self.strata}.")
-        if self.residual_width not in (None, "own") and int(self.residual_width) < 2:
+        if isinstance(self.residual_width, int) and self.residual_width < 2:
             raise BadSetting(f"residual_width must be at least 2, not {self.residual_width}.")
         for name, choice in _CHOICES.items():
             if (value := getattr(self, name)) not in choice:

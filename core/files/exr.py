@@ -233,8 +233,10 @@ def halved(radiance: NDArray[np.float32]) -> NDArray[np.float16] | None:
     return half if (lost <= HALF_ENERGY * whole).all() else None
 
 
-def write(path: Path, radiance: NDArray[np.float32], compressed: bool = True) -> None:
-    """Write a map as half floats where they are enough, else as float32.
+def write(
+    path: Path, radiance: NDArray[np.float32], compressed: bool = True, rounded: bool = True
+) -> None:
+    """Write a map as half floats where they are enough, if it may be rounded, else as float32.
 
     radiance: (height, width, 3), linear Rec.709. compressed: without loss, which takes most of the
     time; halfs by PIZ, which takes half as long as ZIP for the same size.
@@ -242,7 +244,7 @@ def write(path: Path, radiance: NDArray[np.float32], compressed: bool = True) ->
     """
     import OpenEXR
 
-    half = halved(radiance)
+    half = halved(radiance) if rounded else None
     compression = OpenEXR.NO_COMPRESSION
     if compressed:
         compression = OpenEXR.ZIP_COMPRESSION if half is None else OpenEXR.PIZ_COMPRESSION

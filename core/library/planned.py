@@ -41,7 +41,7 @@ class Planned:
         """Bytes that it takes, with its worker."""
         file, asked = self.map.file, self.job.settings.residual_width
         widths = [output.width or 0 for output in self.map.outputs]
-        widths += [file.width if asked == "own" else asked or 0]
+        widths += [file.width if asked == "own" else asked if isinstance(asked, int) else 0]
         return memory_of(file, max(widths))
 
     def with_facts(self, row: Row) -> Row:

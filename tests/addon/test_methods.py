@@ -96,7 +96,7 @@ def test_an_automatic_fill_or_a_chosen_one(scene, sunrise):
     sun = np.flatnonzero(convert(load(sunrise), ConversionSettings(share=0.5)).strata.region_a)
     row, column = np.divmod(sun, 1024)
     for fill, black in (("surroundings", False), ("auto", True), ("black", True)):
-        bpy.ops.sunsplit.convert(share=0.5, method="kmeans", fill=fill)
+        bpy.ops.sunsplit.convert(share=0.5, method="kmeans", fill=fill, skips=False)
         image = scene.world.node_tree.nodes["Sunsplit: Residual"].image
         pixels = np.empty(1024 * 512 * 4, np.float32)
         image.pixels.foreach_get(pixels)

@@ -251,7 +251,7 @@ def test_a_camera_gets_no_wider_a_map_than_it_can_show(two_suns, tmp_path, mirro
     nodes = made.world.node_tree.nodes
     assert nodes["Sunsplit: Camera"].image.size[0] == 2048
     assert nodes["Sunsplit: Camera"].image.name == f"{texture.image.name.split('.')[0]} camera"
-    assert nodes["Sunsplit: Residual"].image.size[0] == (2048 if mirrors else 1024)
+    assert nodes["Sunsplit: Residual"].image.size[0] == (2048 if mirrors else 256)
     assert "gets a map that wide instead of 4096" in made.sunsplit.report
     bpy.ops.sunsplit.convert(skips=False)
     assert "Sunsplit: Camera" not in made.world.node_tree.nodes

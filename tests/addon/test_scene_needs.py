@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
 
 from sunsplit.addon.rays import PLACES, Reach
-from sunsplit.addon.scene_needs import ALL, LIGHTING_WIDTH, SceneNeeds, needs_of
+from sunsplit.addon.scene_needs import ALL, SceneNeeds, needs_of
 from sunsplit.addon.steps import run_at_once
 from tests.blender import (
     add_mesh,
@@ -351,39 +353,22 @@ def test_an_animated_material_may_become_anything(scene):
 
 
 @pytest.mark.parametrize(
-    ("width", "lighting"),
-    [
-        (512, 512),
-        (1024, 1024),
-        (2048, 1024),
-        (8192, 1024),
-        (16384, 1024),
-        (3000, 1000),
-        (3026, 3026),  # a whole part of it would be 178 wide
-        (2 * 4099, 2 * 4099),
-    ],
-)
-def test_a_map_that_only_lights_is_a_whole_part_of_the_map(width, lighting):
-    needs = SceneNeeds(camera_sees_world=True, mirrors=False, other_lights=False)
-    assert needs.residual_width(width) == lighting
-    assert ALL.residual_width(width) == width
-
-
-@pytest.mark.parametrize(
     ("width", "camera", "shown", "mirrored"),
     [
         (8192, 2048, 2048, 2048),
         (8192, 2049, 4096, 4096),
         (8192, 300, 512, 1024),
-        (8192, 9000, 8192, 8192),
+        (8192, 9000, 8192, "own"),
         (3000, 700, 750, 1500),
-        (2 * 4099, 700, 2 * 4099, 2 * 4099),
+        (2 * 4099, 700, 2 * 4099, "own"),
     ],
 )
 def test_a_map_that_is_seen_is_as_wide_as_a_picture_can_show(width, camera, shown, mirrored):
     needs = SceneNeeds(True, mirrors=True, other_lights=False, camera_width=camera)
     assert needs.width_for_camera(width) == shown
     assert needs.residual_width(width) == mirrored
+    assert replace(needs, mirrors=False).residual_width(width) == "lighting"
+    assert ALL.residual_width(width) == "own"
     assert ALL.width_for_camera(width) == width
 
 
@@ -391,11 +376,11 @@ def test_a_wide_map_lights_with_a_narrower_one(scene, tmp_path):
     pixels = sky(2048, 0.3)
     paint_disc(pixels, direction(0, 40), 2, (900, 800, 700))
     hdri_world(scene, write_map(tmp_path / "wide.exr", pixels))
-    for skips, width in ((True, LIGHTING_WIDTH), (False, 2048)):
+    for skips, width in ((True, 256), (False, 2048)):
         bpy.ops.sunsplit.convert(lights=1, skips=skips)
         tree = scene.world.node_tree
         assert tree.nodes["Sunsplit: Residual"].image.size[0] == width
-        assert ("1024 pixels wide instead of 2048" in scene.sunsplit.report) is skips
+        assert ("256 pixels wide instead of 2048" in scene.sunsplit.report) is skips
     bpy.ops.sunsplit.convert(share=1.0, lights=4)
     assert "pixels wide" not in scene.sunsplit.report
 
