@@ -31,7 +31,8 @@ class Conversion:
     (height, width, 3) of the width that was asked for, or None. levelled: the same with all pixels
     of a wide map, where these were asked for; then `residual` is as narrow as what was looked at.
     samples: what a Voronoi residual was made of, else None. predicted_error: what shadows of the
-    suns are wrong by, as a part of the mean irradiance; see `prediction.Prediction`. ground_error:
+    suns are wrong by, as a part of the mean irradiance; see `prediction.Prediction`, and
+    `placement.ChosenSuns.standing_error` for walls. ground_error:
     what level ground in the open gets wrong of the worst channel, as a part of its irradiance.
     visible: what suns were chosen from, where that is not the whole map. notes: plain sentences
     for the user.
@@ -48,6 +49,7 @@ class Conversion:
     account: Account
     predicted_error: float
     ground_error: float
+    standing_error: float
     visible: VisiblePart | None
     notes: tuple[str, ...]
 
@@ -122,6 +124,7 @@ def convert(
         account,
         chosen.predicted_error,
         chosen.ground_error,
+        chosen.standing_error,
         visible,
         notes,
     )

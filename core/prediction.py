@@ -17,6 +17,7 @@ from . import sphere
 from .environment import LUMINANCE_WEIGHTS
 from .patches import Patches
 from .shadow_edges import facing_up, half_widths
+from .standing import discs_on_walls, on_walls
 from .sums import weighted_sum
 from .suns import Sun, disc_on_ground
 from .two_orders import WIDEST_SHADOWED, irradiance_of_two_orders
@@ -123,6 +124,8 @@ class Prediction:
     irradiance: of each surface, luminance, (s,). mean: what surfaces get in the open from the
     whole map, on average over all that they may face. ground: what level ground gets in the open,
     as a part of the light that suns replace, of each channel; nan where a channel has none, (3,).
+    standing: what walls on level ground get, as parts of the luminous light that suns replace,
+    (WALLS,); None where the ground does not hide all light below the horizon, as in EEVEE.
     part: of all light that suns replace. of_residual: what the rest of the light is wrong by, where
     it is shown without its shadows, as `error` counts: no suns mend that. in_eevee: see
     `two_orders`.
@@ -132,6 +135,7 @@ class Prediction:
     irradiance: Floats
     mean: float
     ground: Floats
+    standing: Floats | None
     part: float
     of_residual: float = 0.0
     in_eevee: bool = False
@@ -162,13 +166,17 @@ class Prediction:
             lacking = surfaces.of(unshadowed) - shown
             wanted += lacking
             of_residual = float(np.sqrt(np.mean(lacking**2))) / (all_light / 4)
-        ground, part = np.full(3, np.nan), 0.0
+        ground, standing, part = np.full(3, np.nan), None, 0.0
         if patches is not None:
+            flux = patches.flux @ LUMINANCE_WEIGHTS
+            if not in_eevee:
+                walls = on_walls(patches.directions, half_widths(patches.spread))
+                standing = weighted_sum(flux, walls) / flux.sum()
             ground = _parts(
                 patches.flux, facing_up(patches.directions, half_widths(patches.spread))
             )
-            part = float((patches.flux @ LUMINANCE_WEIGHTS).sum()) / all_light
-        return cls(surfaces, wanted, all_light / 4, ground, part, of_residual, in_eevee)
+            part = float(flux.sum()) / all_light
+        return cls(surfaces, wanted, all_light / 4, ground, standing, part, of_residual, in_eevee)
 
     def error(self, suns: Sequence[Sun]) -> float:
         """Root mean square of what surfaces get wrong under shadows if these suns stand in for
@@ -190,6 +198,17 @@ class Prediction:
         seen = [disc_on_ground(float(sun.to_light[2]), sun.angular_diameter / 2) for sun in suns]
         given = _parts(np.array([sun.scalar_irradiance for sun in suns]), np.array(seen))
         return float(self.part * np.nanmax(np.abs(given - self.ground)))
+
+    def wrong_on_walls(self, suns: Sequence[Sun]) -> float:
+        """What walls on level ground get wrong of luminance, root mean square, as a part of the
+        mean irradiance in the open."""
+        if not len(suns) or self.standing is None:
+            return 0.0
+        flux = np.array([sun.scalar_irradiance for sun in suns]) @ LUMINANCE_WEIGHTS
+        half = np.array([sun.angular_diameter / 2 for sun in suns])
+        seen = discs_on_walls(np.array([sun.to_light for sun in suns]), half)
+        wrong = weighted_sum(flux, seen) / flux.sum() - self.standing
+        return 4 * self.part * float(np.sqrt(np.mean(wrong**2)))
 
 
 def _parts(flux: Floats, seen: Floats) -> Floats:

@@ -123,7 +123,8 @@ def _fewest_by_edge(
         chosen = _judged(chosen, prediction, strata)
         if chosen.worst <= allowed or chosen.worst == chosen.predicted_error:
             return chosen
-        level = replace(chosen, suns=levelled(chosen.suns, prediction.ground))
+        suns = levelled(chosen.suns, prediction.ground, prediction.standing)
+        level = replace(chosen, suns=suns)
         return min(chosen, _judged(level, prediction, strata), key=lambda one: one.worst)
 
     def with_lights(count: int) -> ChosenSuns:
@@ -144,6 +145,7 @@ def _judged(chosen: ChosenSuns, prediction: Prediction, strata: Strata) -> Chose
         chosen,
         predicted_error=prediction.error(chosen.suns),
         ground_error=prediction.wrong_on_ground(chosen.suns) / strata.part_on_ground,
+        standing_error=prediction.wrong_on_walls(chosen.suns),
     )
 
 

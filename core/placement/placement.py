@@ -39,9 +39,12 @@ class Placement:
         return _nearest_sites(self.light, self.sites) if self.given is None else self.given
 
 
-ON_GROUND = 0.3
+ON_GROUND = 0.25
 """So much of a tolerance is allowed on level ground: what it gets wrong is wrong all over a
 picture, not only at shadows' edges."""
+
+ON_WALLS = 1.0
+"""And so much on walls that stand on it: each is wrong all over, but they are many."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,20 +52,24 @@ class ChosenSuns:
     """Suns, brightest first, and notes for the user.
 
     predicted_error: see `prediction.Prediction`. ground_error: of the irradiance of level ground in
-    the open, by the worst channel. Both nan before they are known. taken: the light of each, None
-    without suns.
+    the open, by the worst channel. Both nan before they are known. standing_error: what walls on
+    that ground get wrong, root mean square, as a part of the mean irradiance. taken: the light of
+    each, None without suns.
     """
 
     suns: tuple[Sun, ...]
     predicted_error: float
     notes: tuple[str, ...]
     ground_error: float = np.nan
+    standing_error: float = 0.0
     taken: Taken | None = None
 
     @property
     def worst(self) -> float:
         """What a tolerance is held against."""
-        return max(self.predicted_error, self.ground_error / ON_GROUND)
+        return max(
+            self.predicted_error, self.ground_error / ON_GROUND, self.standing_error / ON_WALLS
+        )
 
 
 Place = Callable[[RegionLight, int], Placement]

@@ -14,7 +14,7 @@ from sunsplit.core import ConversionSettings, convert, load
 from sunsplit.core.environment import LUMINANCE_WEIGHTS
 from sunsplit.core.placement import choice
 from sunsplit.core.placement.light_count import fewest
-from sunsplit.core.placement.placement import ON_GROUND
+from sunsplit.core.placement.placement import ON_GROUND, ON_WALLS
 from tests.benchmarks.occluders import NEVER, Occluders, draw_occluders, light_of, light_of_suns
 from tests.maps import direction, environment, paint_disc, sky
 
@@ -71,7 +71,7 @@ def two_suns_and_a_sky():
 
 @pytest.mark.parametrize("share", [None, 1])
 @pytest.mark.parametrize("real", [True, False])
-def test_fewer_patches_find_about_as_many_lights(sunrise, monkeypatch, real, share):
+def test_fewer_patches_need_hardly_more_lights(sunrise, monkeypatch, real, share):
     settings = ConversionSettings(share=share, tolerance=1.0)
     made = []
     for fewest_patches in (choice.FEWEST_SEARCHED, choice.MOST_PATCHES):
@@ -81,12 +81,13 @@ def test_fewer_patches_find_about_as_many_lights(sunrise, monkeypatch, real, sha
         assert wrong(conversion) <= 0.01
         made.append(len(conversion.suns))
     print("fewer patches, most patches:", made)
-    assert abs(made[0] - made[1]) <= max(0.15 * made[1], 1)
+    assert made[0] <= made[1] + max(0.15 * made[1], 1)
 
 
 def wrong(conversion) -> float:
     """What a tolerance is held against."""
-    return max(conversion.predicted_error, conversion.ground_error / ON_GROUND)
+    errors = conversion.ground_error / ON_GROUND, conversion.standing_error / ON_WALLS
+    return max(conversion.predicted_error, *errors)
 
 
 @pytest.mark.parametrize("lights", [1, 3, 20])
