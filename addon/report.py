@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from bpy.app.translations import pgettext_rpt as said
 
 from ..core.conversion import Conversion
 from ..core.settings import ConversionSettings
 from ..core.suspicions import map_warnings
 from .scene_needs import SceneNeeds
+
+if TYPE_CHECKING:
+    from ..core.files.written import WrittenConversion
 
 ALL_LIGHT = 0.999
 """Of all light, in lamps: the rest shows nowhere."""
@@ -23,19 +28,21 @@ def headline(count: int, share: float) -> str:
     return said("{count} lamps with {share:.1%} of all light").format(count=count, share=share)
 
 
-def predicted(edges: float, ground: float) -> str:
+def predicted(conversion: Conversion | WrittenConversion) -> str:
     """What is to be wrong by prediction, as parts of the light."""
     text = said(
-        "By prediction right within {edges:.2%} under shadows, {ground:.2%} on level ground"
+        "By prediction right within {edges:.2%} under shadows, {ground:.2%} on level ground, "
+        "{walls:.2%} on walls"
     )
-    return text.format(edges=edges, ground=ground)
+    edges, ground = conversion.predicted_error, conversion.ground_error
+    return text.format(edges=edges, ground=ground, walls=conversion.standing_error)
 
 
 def made_sentences(conversion: Conversion) -> list[str]:
     """How true it is, and what the user should know of it."""
     lines = []
     if conversion.suns:
-        lines.append(predicted(conversion.predicted_error, conversion.ground_error))
+        lines.append(predicted(conversion))
     if conversion.residual is not None:
         error = conversion.account.relative_error.max()
         lines.append(said("Account: lamps + world = map within {error:.0e}").format(error=error))

@@ -62,7 +62,8 @@ def _sun_lines(conversion: Conversion) -> list[str]:
     if conversion.suns:
         lines.append(
             f"predicted to be right within {conversion.predicted_error:.2%} under shadows, "
-            f"{conversion.ground_error:.2%} on level ground"
+            f"{conversion.ground_error:.2%} on level ground, "
+            f"{conversion.standing_error:.2%} on walls"
         )
     return [*lines, *conversion.notes]
 

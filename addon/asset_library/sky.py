@@ -109,5 +109,5 @@ def _report(conversion: WrittenConversion) -> str:
     """For the panel of a scene that uses it."""
     lines = [headline(len(conversion.suns), conversion.account.share)]
     if conversion.suns:
-        lines.append(predicted(conversion.predicted_error, conversion.ground_error))
+        lines.append(predicted(conversion))
     return "\n".join(lines)

@@ -135,6 +135,7 @@ def describe(conversion: Conversion) -> dict[str, Any]:
         "predicted_error": {
             "shadow_edges_percent": 100 * conversion.predicted_error,
             "level_ground_percent": 100 * conversion.ground_error,
+            "walls_percent": 100 * conversion.standing_error,
         },
         "notes": [*map_warnings(environment), *conversion.notes],
     }

@@ -22,8 +22,8 @@ from .belonging import read_named, read_together
 class WrittenConversion:
     """source_sha256: of the map's file. suns: brightest first. residual: its file, or None.
     radiance: of the residual, float32 (height, width, 3), narrowed where it is wider than asked.
-    has_cells: the residual is a Voronoi map. predicted_error, ground_error: parts, as
-    `Conversion` has them."""
+    has_cells: the residual is a Voronoi map. predicted_error, ground_error,
+    standing_error: parts, as `Conversion` has them."""
 
     source_sha256: str
     suns: tuple[Sun, ...]
@@ -33,6 +33,7 @@ class WrittenConversion:
     has_cells: bool
     predicted_error: float
     ground_error: float
+    standing_error: float
 
 
 def read_written(lights: str | Path, widest: int = WIDE) -> WrittenConversion:
@@ -78,6 +79,6 @@ def _radiance_of(residual: Path, widest: int) -> NDArray[np.float32]:
     return radiance
 
 
-def _errors(stated: dict[str, Any]) -> tuple[float, float]:
-    percents = stated["shadow_edges_percent"], stated["level_ground_percent"]
-    return float(percents[0]) / 100, float(percents[1]) / 100
+def _errors(stated: dict[str, Any]) -> tuple[float, ...]:
+    names = ("shadow_edges_percent", "level_ground_percent", "walls_percent")
+    return tuple(float(stated[name]) / 100 for name in names)

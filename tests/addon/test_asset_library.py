@@ -38,6 +38,8 @@ from tests.render.compare import estimate, means_agree
 WORKER = ROOT / "addon" / "asset_library" / "worker.py"
 
 NAME = "Sunrise"
+LAMPS = 5
+"""Of the sunrise by default."""
 
 
 @contextmanager
@@ -139,7 +141,7 @@ def test_the_file_holds_nothing_else(file):
     assert found["worlds"] == [NAME]
     assert found["collections"] == [f"{NAME} Suns"]
     assert len(found["images"]) == 2
-    assert len(found["lights"]) == 4
+    assert len(found["lights"]) == LAMPS
     assert not found["scenes"] + found["meshes"] + found["cameras"] + found["materials"]
 
 
@@ -281,9 +283,9 @@ def test_an_appended_world_becomes_the_conversion_and_restore_takes_it_away(tmp_
     assert [entry.lamp.name for entry in state.lamps] == [
         lamp.name for lamp in lamps_of(state.collection)
     ]
-    assert len(state.lamps) == 4
+    assert len(state.lamps) == LAMPS
     assert state.sky.parent is None
-    assert state.report.startswith("4 lamps with ")
+    assert state.report.startswith(f"{LAMPS} lamps with ")
     assert scene.world.asset_data is None
     assert state.collection.asset_data is None
     # What an artist turns and dims.
@@ -313,7 +315,7 @@ def test_suns_alone_bring_their_world(file, link):
     assert scene.world == world
     # Once, and not also as the instance that Link makes.
     assert sorted(o.name for o in scene.objects) == sorted(o.name for o in suns_of(world).objects)
-    assert len(scene.sunsplit.lamps) == 4
+    assert len(scene.sunsplit.lamps) == LAMPS
     # There was no world before: what Restore brings back is the map itself.
     bpy.ops.sunsplit.restore()
     assert scene.world.library is None
@@ -331,7 +333,7 @@ def test_a_linked_sky_stays_linked_and_can_be_taken_away(file):
     brought("World", file, NAME, link=True)
     used(scene, bpy.data.worlds[NAME])
     assert scene.world.library is not None
-    assert len([o for o in scene.objects if o.type == "LIGHT"]) == 4
+    assert len([o for o in scene.objects if o.type == "LIGHT"]) == LAMPS
     lamp = scene.sunsplit.lamps[0].lamp
     assert np.linalg.norm(to_light(lamp)) == pytest.approx(1)
     bpy.ops.sunsplit.restore()
@@ -409,7 +411,7 @@ def test_linked_suns_that_come_a_second_time_stand_there_once(file):
     complete_imported(scene, [sky], sky)
     assert sorted(thing.name for thing in scene.objects) == standing
     assert scene.sunsplit.original_world == own
-    assert len(scene.sunsplit.lamps) == 4
+    assert len(scene.sunsplit.lamps) == LAMPS
 
 
 def test_another_sky_takes_the_place_of_the_first(file):
@@ -422,7 +424,7 @@ def test_another_sky_takes_the_place_of_the_first(file):
         (new,) = set(bpy.data.worlds) - worlds
         used(scene, new)
     assert scene.world == new
-    assert len([o for o in scene.objects if o.type == "LIGHT"]) == 4
+    assert len([o for o in scene.objects if o.type == "LIGHT"]) == LAMPS
     assert sorted(world.name for world in bpy.data.worlds) == sorted([own.name, NAME])
     assert all(not thing.name.endswith(".001") for thing in scene.objects)
     bpy.ops.sunsplit.restore()
@@ -440,7 +442,7 @@ def test_a_sky_takes_the_place_of_a_conversion(tmp_path, file):
     brought("World", file, NAME)
     used(scene, bpy.data.worlds[NAME])
     assert scene.sunsplit.original_world == own
-    assert len([o for o in scene.objects if o.type == "LIGHT"]) == 4
+    assert len([o for o in scene.objects if o.type == "LIGHT"]) == LAMPS
     bpy.ops.sunsplit.restore()
     assert scene.world == own
     assert not scene.objects
@@ -469,7 +471,7 @@ def test_a_world_chosen_by_hand_gets_its_suns_by_a_button(file):
     scene.world = here.worlds[0]
     assert not scene.objects
     bpy.ops.sunsplit.complete_sky()
-    assert len([o for o in scene.objects if o.type == "LIGHT"]) == 4
+    assert len([o for o in scene.objects if o.type == "LIGHT"]) == LAMPS
     assert not bpy.ops.sunsplit.complete_sky.poll()
 
 

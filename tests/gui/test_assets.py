@@ -109,6 +109,9 @@ def find(window: Window, name: str) -> tuple[int, int]:
 DOUBLE_CLICK = 0.5
 """Seconds after which a second press is a new one."""
 
+LAMPS = 5
+"""Of the sunrise by default."""
+
 METHODS = {"by default": "FOLLOW_PREFS", "append": "APPEND", "link": "LINK"}
 
 
@@ -118,7 +121,7 @@ def test_one_of_the_two_brings_both(browser: Window, method: str, name: str, qui
     found = drag(browser, method, name)
     assert found["world"] == WORLD
     assert found["original"] == "World"
-    assert len(found["lamps"]) == 4
+    assert len(found["lamps"]) == LAMPS
     assert sorted(found["lamps"]) == sorted(found["known"])
     assert not found["instances"]
     assert found["editable"] == (method != "LINK")
@@ -151,6 +154,6 @@ def test_both_dragged_are_still_one_sky(browser: Window, quiet: None):
     found = drag(browser, "FOLLOW_PREFS", SUNS)
     browser.settle()
     found = browser.ask("sky_state()")
-    assert len(found["lamps"]) == len(found["known"]) == 4
+    assert len(found["lamps"]) == len(found["known"]) == LAMPS
     assert not found["instances"]
     assert found["original"] == "World"
