@@ -220,26 +220,19 @@ def _parts(flux: Floats, seen: Floats) -> Floats:
 def _pieces(suns: Sequence[Sun]) -> tuple[Floats, Floats, Floats]:
     """Each sun, one at least, as points in a spiral over its disc: directions, luminous light and
     half widths."""
-    axes = sphere.tangents(np.array([sun.to_light for sun in suns]))
+    to_light = np.array([sun.to_light for sun in suns])
+    axes = np.stack([*sphere.tangents(to_light), to_light], axis=1)
     light = np.array([sun.scalar_irradiance for sun in suns]) @ LUMINANCE_WEIGHTS
     weight = light * np.sqrt([sun.angular_diameter for sun in suns])
     parts = PIECES * weight / max(weight.sum(), 1e-300)
     counts = np.maximum(np.round(parts).astype(int), FEWEST)
     found = []
-    for sun, whole, count, first, second in zip(suns, light, counts, *axes, strict=True):
+    for sun, whole, count, its_axes in zip(suns, light, counts, axes, strict=True):
         if sun.angular_diameter == 0:
             found.append((sun.to_light[None], np.array([whole]), np.array([SHARP])))
             continue
-        part = (np.arange(count) + 0.5) / count
-        turn = np.arange(count) * (np.pi * (3 - np.sqrt(5)))
         cap = 2 * np.sin(sun.angular_diameter / 4) ** 2  # 1 - cos of the half-angle
-        along = 1 - part * cap
-        aside = np.sqrt(1 - along**2)
-        directions = (
-            along[:, None] * sun.to_light
-            + (aside * np.cos(turn))[:, None] * first
-            + (aside * np.sin(turn))[:, None] * second
-        )
+        directions = sphere.spiral(cap, count) @ its_axes
         half = np.sqrt(2 * np.pi * cap / count) / 2
         found.append((directions, np.full(count, whole / count), np.full(count, half)))
     directions, given, half_width = (np.concatenate(arrays) for arrays in zip(*found, strict=True))

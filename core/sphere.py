@@ -167,6 +167,18 @@ def circle(to_centre: Floats, angular_radius: float, count: int = 361) -> Floats
     return np.cos(angular_radius) * to_centre + np.sin(angular_radius) * rim
 
 
+def spiral(cap: Floats | float, count: int) -> Floats:
+    """Points spread evenly over caps around +Z, (..., count, 3): of the same part of it each.
+
+    cap: 1 - cos of the half-angle of each, (...).
+    """
+    part = (np.arange(count) + 0.5) / count
+    turn = np.arange(count) * (np.pi * (3 - np.sqrt(5)))
+    along = 1 - np.asarray(cap)[..., None] * part
+    aside = np.sqrt(np.maximum(1 - along**2, 0))
+    return np.stack([aside * np.cos(turn), aside * np.sin(turn), along], axis=-1)
+
+
 def tangents(directions: Floats) -> tuple[Floats, Floats]:
     """Two unit vectors that stand upright on each direction and on each other, (..., 3)."""
     helper = np.zeros_like(directions)

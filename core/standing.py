@@ -39,13 +39,9 @@ def discs_on_walls(to_light: Floats, half_angle: Floats) -> Floats:
 
     Each is a spiral of pieces.
     """
-    part = (np.arange(PIECES) + 0.5) / PIECES
-    turn = np.arange(PIECES) * (np.pi * (3 - np.sqrt(5)))
     cap = 2 * np.sin(half_angle / 2) ** 2  # 1 - cos
-    along = 1 - cap[:, None] * part
-    aside = np.sqrt(np.maximum(1 - along**2, 0))
     axes = np.stack([*sphere.tangents(to_light), to_light], axis=1)
-    places = np.stack([aside * np.cos(turn), aside * np.sin(turn), along], axis=-1)
+    places = sphere.spiral(cap, PIECES) @ axes
     half = np.repeat(np.sqrt(2 * np.pi * cap / PIECES) / 2, PIECES)
-    found = on_walls((places @ axes).reshape(-1, 3), half)
+    found = on_walls(places.reshape(-1, 3), half)
     return found.reshape(len(to_light), PIECES, WALLS).mean(axis=1)

@@ -60,6 +60,16 @@ def test_bright_light_keeps_its_pixels_and_faint_light_becomes_blocks():
     assert patches.spread.max() > 50 * patches.spread.min()
 
 
+@pytest.mark.parametrize("most", [256, 512, 2048])
+def test_a_sun_is_no_block_however_many_blocks_its_sky_has(sunrise, most):
+    """A map 1,024 wide has 2,048 of the largest."""
+    light = light_of_map(load(sunrise).radiance)
+    patches = patched(light, most)
+    brightest = patches.spread[np.argmax(patches.flux.sum(axis=1))]
+    assert brightest < 2 * light.spread().max()
+    assert 2048 < len(patches) < 2048 + most
+
+
 def test_few_pixels_are_themselves(sunrise):
     light = light_of_map(load(sunrise).radiance)
     faint = light.luminous_flux < np.median(light.luminous_flux)
