@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,9 @@ of it. What is bright and was not met is asked for by itself."""
 
 LEAST_PLACES = 100
 """In each of several frames, as those next to each other show nearly the same."""
+
+ENOUGH = 300
+"""Looks that escaped, over all frames so far: with them these fewest places suffice."""
 
 PATHS = 2
 """So many for each of these places at most: some pictures show little but the world."""
@@ -46,7 +50,7 @@ class Reach:
     escaped: list[Vector] = field(default_factory=list)
     started: list[int] = field(default_factory=list)
     met: list[Place] = field(default_factory=list)
-    random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
+    random: Random = field(default_factory=lambda: Random(0))  # numpy's takes longer for few
 
     @classmethod
     def steps(cls, sight: Sight) -> Steps[Reach]:
@@ -54,7 +58,7 @@ class Reach:
         found = cls(sight)
         each = max(PLACES // len(sight.moments), LEAST_PLACES)
         for moment in sight.moments:
-            yield from found._find(moment, each, PATHS * each)
+            yield from found._find(moment, each, PATHS * each, ENOUGH)
         return found
 
     def looks(self, to_map: NDArray[np.float64], run: Callable[[Steps], Any]) -> Looks:
@@ -81,12 +85,12 @@ class Reach:
                 yield
         return False
 
-    def _find(self, moment: Moment, count: int, paths: int) -> Steps[None]:
-        """Follow paths until so many places are known in a moment; a path that meets nothing finds
-        none."""
+    def _find(self, moment: Moment, count: int, paths: int, enough: float = np.inf) -> Steps[None]:
+        """Follow paths until so many places are known in a moment, or so many looks escaped; a path
+        that meets nothing finds none."""
         known = sum(place.moment == moment.number for place in self.places)
         for _ in range(paths):
-            if known >= count:
+            if known >= (count if len(self.escaped) < enough else LEAST_PLACES):
                 return
             before = len(self.places)
             self.follow_another(moment)
@@ -95,7 +99,7 @@ class Reach:
 
     def follow_another(self, moment: Moment) -> None:
         """A path from the camera, through another point of its picture."""
-        start, direction = moment.view.ray(*self.random.random(2))
+        start, direction = moment.view.ray(self.random.random(), self.random.random())
         passed: list[Place] = []
         place = moment.cast(start, direction, passed)
         for side in passed:
@@ -109,8 +113,9 @@ class Reach:
         """Note a place, and the last one that some rays over its surface meet."""
         self.places.append(place)
         last = None
-        for x, y, z in self.random.normal(size=(LOOKS, 3)):
-            direction = Vector((x, y, z)).normalized()
+        normal = self.random.gauss
+        for _ in range(LOOKS):
+            direction = Vector((normal(0, 1), normal(0, 1), normal(0, 1))).normalized()
             if direction.dot(place.normal) < 0:
                 direction = -direction
             found = moment.cast(place.point, direction)
