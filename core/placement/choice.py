@@ -35,9 +35,10 @@ TOLD_BY = 4096
 """Patches by which errors are predicted: as far from what many more tell as MOST_PATCHES are, as
 both are good to a tenth only."""
 
-HOPELESS = 1.25
-"""So many are too few if the first cells for them are this much more wrong than is allowed: later
-rounds mend more than a fifth of that for one number in twenty."""
+HOPELESS, OFF_LEVEL = 1.25, 4.0
+"""So many are too few if the first cells for them leave shadows this much more wrong than is
+allowed: later rounds mend more than a fifth of that for one number in twenty. Level ground and
+walls, which depend on where single cells lie, come right more often."""
 
 
 def choose_suns(
@@ -130,13 +131,12 @@ def _fewest_by_edge(
 
     def with_lights(count: int) -> ChosenSuns:
         rough = of_cells(count, rough=True)
-        if not allowed < rough.worst <= HOPELESS * allowed:
+        hopeless = rough.predicted_error > HOPELESS * allowed or rough.worst > OFF_LEVEL * allowed
+        if hopeless or rough.worst <= allowed:
             return rough
         return min(rough, of_cells(count, rough=False), key=lambda one: one.worst)
 
     found = fewest(with_lights, allowed, settings.most_lights, expected)
-    if found.worst > allowed:
-        return found
     return min(found, of_cells(len(found.suns), rough=False), key=lambda one: one.worst)
 
 

@@ -123,6 +123,16 @@ def test_too_few_lights_say_so(sunrise):
     assert "more than the 0.5 % allowed" in notes
 
 
+@pytest.mark.parametrize("lights", [16, 32])
+def test_the_best_of_too_few_are_cut_with_care(sunrise, monkeypatch, lights):
+    """Numbers that are clearly too few are told by rough cells, but none is kept with these."""
+    asked = ConversionSettings(share=1, lights=lights, tolerance=0.1)
+    quick = convert(load(sunrise), asked)
+    monkeypatch.setattr(choice, "HOPELESS", np.inf)
+    careful = convert(load(sunrise), asked)
+    assert wrong(quick) <= 1.02 * wrong(careful)
+
+
 @given(st.lists(st.floats(0.5, 2), min_size=40, max_size=40), st.floats(0.02, 2))
 def test_fewest_is_enough_and_fewer_are_not(bumps, allowed):
     """Whatever way the error takes; and whatever is expected of it."""
