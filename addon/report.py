@@ -30,12 +30,18 @@ def headline(count: int, share: float) -> str:
 
 def predicted(conversion: Conversion | WrittenConversion) -> str:
     """What is to be wrong by prediction, as parts of the light."""
-    text = said(
-        "By prediction right within {edges:.2%} under shadows, {ground:.2%} on level ground, "
-        "{walls:.2%} on walls"
-    )
     edges, ground = conversion.predicted_error, conversion.ground_error
-    return text.format(edges=edges, ground=ground, walls=conversion.standing_error)
+    walls = conversion.standing_error
+    if walls is None:
+        text = said(
+            "By prediction right within {edges:.2%} under shadows, {ground:.2%} on level ground"
+        )
+    else:
+        text = said(
+            "By prediction right within {edges:.2%} under shadows, {ground:.2%} on level ground, "
+            "{walls:.2%} on walls"
+        )
+    return text.format(edges=edges, ground=ground, walls=walls)
 
 
 def made_sentences(conversion: Conversion) -> list[str]:

@@ -49,7 +49,7 @@ class Conversion:
     account: Account
     predicted_error: float
     ground_error: float
-    standing_error: float
+    standing_error: float | None
     visible: VisiblePart | None
     notes: tuple[str, ...]
 

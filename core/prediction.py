@@ -199,11 +199,12 @@ class Prediction:
         given = _parts(np.array([sun.scalar_irradiance for sun in suns]), np.array(seen))
         return float(self.part * np.nanmax(np.abs(given - self.ground)))
 
-    def wrong_on_walls(self, suns: Sequence[Sun]) -> float:
+    def wrong_on_walls(self, suns: Sequence[Sun]) -> float | None:
         """What walls on level ground get wrong of luminance, root mean square, as a part of the
-        mean irradiance in the open."""
+        mean irradiance in the open; None where the ground does not hide what is below the
+        horizon."""
         if not len(suns) or self.standing is None:
-            return 0.0
+            return None
         flux = np.array([sun.scalar_irradiance for sun in suns]) @ LUMINANCE_WEIGHTS
         half = np.array([sun.angular_diameter / 2 for sun in suns])
         seen = discs_on_walls(np.array([sun.to_light for sun in suns]), half)

@@ -60,10 +60,11 @@ def _sun_lines(conversion: Conversion) -> list[str]:
     if len(conversion.suns) > LISTED:
         lines.append(f"       and {len(conversion.suns) - LISTED} more")
     if conversion.suns:
+        walls = conversion.standing_error
         lines.append(
             f"predicted to be right within {conversion.predicted_error:.2%} under shadows, "
-            f"{conversion.ground_error:.2%} on level ground, "
-            f"{conversion.standing_error:.2%} on walls"
+            f"{conversion.ground_error:.2%} on level ground"
+            + ("" if walls is None else f", {walls:.2%} on walls")
         )
     return [*lines, *conversion.notes]
 

@@ -101,6 +101,7 @@ def _write(conversion: Conversion, drafts: dict[str, Path]) -> None:
 def describe(conversion: Conversion) -> dict[str, Any]:
     """The document of `<name>.lights.json`, but for the SHA-256 of the files that it names."""
     environment, account = conversion.environment, conversion.account
+    walls = conversion.standing_error
     residual = None
     if conversion.residual is not None:
         height, width = conversion.residual.shape[:2]
@@ -135,7 +136,7 @@ def describe(conversion: Conversion) -> dict[str, Any]:
         "predicted_error": {
             "shadow_edges_percent": 100 * conversion.predicted_error,
             "level_ground_percent": 100 * conversion.ground_error,
-            "walls_percent": 100 * conversion.standing_error,
+            "walls_percent": None if walls is None else 100 * walls,
         },
         "notes": [*map_warnings(environment), *conversion.notes],
     }

@@ -33,7 +33,7 @@ class WrittenConversion:
     has_cells: bool
     predicted_error: float
     ground_error: float
-    standing_error: float
+    standing_error: float | None
 
 
 def read_written(lights: str | Path, widest: int = WIDE) -> WrittenConversion:
@@ -79,6 +79,7 @@ def _radiance_of(residual: Path, widest: int) -> NDArray[np.float32]:
     return radiance
 
 
-def _errors(stated: dict[str, Any]) -> tuple[float, ...]:
-    names = ("shadow_edges_percent", "level_ground_percent", "walls_percent")
-    return tuple(float(stated[name]) / 100 for name in names)
+def _errors(stated: dict[str, Any]) -> tuple[float, float, float | None]:
+    edges, ground = stated["shadow_edges_percent"], stated["level_ground_percent"]
+    walls = stated.get("walls_percent")  # earlier files do not state it
+    return float(edges) / 100, float(ground) / 100, None if walls is None else float(walls) / 100

@@ -53,7 +53,8 @@ class ChosenSuns:
 
     predicted_error: see `prediction.Prediction`. ground_error: of the irradiance of level ground in
     the open, by the worst channel. Both nan before they are known. standing_error: what walls on
-    that ground get wrong, root mean square, as a part of the mean irradiance. taken: the light of
+    that ground get wrong, root mean square, as a part of the mean irradiance; None where that is
+    not predicted. taken: the light of
     each, None without suns.
     """
 
@@ -61,15 +62,14 @@ class ChosenSuns:
     predicted_error: float
     notes: tuple[str, ...]
     ground_error: float = np.nan
-    standing_error: float = 0.0
+    standing_error: float | None = None
     taken: Taken | None = None
 
     @property
     def worst(self) -> float:
         """What a tolerance is held against."""
-        return max(
-            self.predicted_error, self.ground_error / ON_GROUND, self.standing_error / ON_WALLS
-        )
+        walls = self.standing_error or 0.0
+        return max(self.predicted_error, self.ground_error / ON_GROUND, walls / ON_WALLS)
 
 
 Place = Callable[[RegionLight, int], Placement]
