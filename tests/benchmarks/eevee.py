@@ -66,10 +66,12 @@ class Result:
         return (self.images["cycles"] + self.images["cycles again"]) / 2
 
     def wrong(self, way: str) -> float:
-        """Root mean square over surfaces and channels against Cycles, as a part of the mean."""
+        """Root mean square over surfaces and channels against Cycles, as a part of the mean, what
+        the reference's own noise adds to it taken off."""
         on = self.surfaces
         wanted = self.reference[on][:, :3]
-        return _rms(self.images[way][on][:, :3] - wanted) / wanted.mean()
+        apart = _rms(self.images[way][on][:, :3] - wanted) / wanted.mean()
+        return float(np.sqrt(max(apart**2 - self.noise**2, 0.0)))
 
     def mean(self, way: str) -> float:
         """Of the surfaces, against Cycles."""
@@ -78,7 +80,7 @@ class Result:
 
     @property
     def noise(self) -> float:
-        """Of the reference, as it adds to `wrong`."""
+        """Of the reference, as it adds to what pictures are apart from it."""
         on = self.surfaces
         apart = self.images["cycles"][on][:, :3] - self.images["cycles again"][on][:, :3]
         return _rms(apart) / 2 / self.reference[on][:, :3].mean()

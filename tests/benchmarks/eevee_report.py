@@ -70,7 +70,8 @@ def write(results: Sequence[Result], folder: Path, name: str) -> None:
         "",
         f"Blender {first.blender}, EEVEE on llvmpipe with {first.samples} samples, direct light "
         "only. Root mean square of the difference from Cycles with the plain HDRI, over all "
-        "surfaces and channels, in percent of the mean; in brackets the ratio of the means. "
+        "surfaces and channels, the noise of Cycles taken off, in percent of the mean; in brackets "
+        "the ratio of the means. "
         "Times less wrong: converted, than the better of the first two. Seconds of a frame: of "
         "the three in EEVEE, on two cores without a graphics card; on a machine that did other "
         "things too, so only ratios tell.",
