@@ -12,7 +12,7 @@ from bpy.props import (
 )
 
 from ..core.export.settings import LUMENS_PER_WATT
-from ..core.settings import IN_EEVEE, MOST, TOLERANCE, ConversionSettings
+from ..core.settings import MOST, TOLERANCE, ConversionSettings
 
 DEFAULTS = ConversionSettings()
 
@@ -50,8 +50,7 @@ CHOICES = {
     "tolerance": FloatProperty(
         name="Tolerance",
         description="How wrong shadows may be by prediction, in percent of the mean light: more "
-        f"lamps are not made. 0: {TOLERANCE:g} % where Lights is 0 ({IN_EEVEE * TOLERANCE:g} % for "
-        "EEVEE), else none",
+        f"lamps are not made. 0: {TOLERANCE:g} % where Lights is 0, else none",
         default=0.0,
         options=_FRESH,
         min=0.0,

@@ -7,7 +7,6 @@ from typing import get_args
 
 from .figure_settings import FigureSettings
 from .settings import (
-    IN_EEVEE,
     TOLERANCE,
     ConversionSettings,
     Fill,
@@ -139,7 +138,7 @@ def _add_placement(group: argparse._ArgumentGroup) -> None:
         type=_percent,
         metavar="PERCENT",
         help="how wrong shadows may be by prediction, of the mean irradiance (default: "
-        f"{TOLERANCE:g} with --lights auto, {IN_EEVEE * TOLERANCE:g} for EEVEE, else none)",
+        f"{TOLERANCE:g} with --lights auto, else none)",
     )
     group.add_argument(
         "--method",

@@ -20,7 +20,7 @@ from .shadow_edges import facing_up, half_widths
 from .standing import discs_on_walls, on_walls
 from .sums import weighted_sum
 from .suns import Sun, disc_on_ground
-from .two_orders import WIDEST_SHADOWED, irradiance_of_two_orders
+from .two_orders import irradiance_of_two_orders, part_shadowed
 
 Floats = NDArray[np.float64]
 
@@ -181,14 +181,17 @@ class Prediction:
     def error(self, suns: Sequence[Sun]) -> float:
         """Root mean square of what surfaces get wrong under shadows if these suns stand in for
         the light, as a part of the mean irradiance in the open."""
-        wide = [self.in_eevee and sun.angular_diameter > WIDEST_SHADOWED for sun in suns]
-        shadowed = [sun for sun, is_wide in zip(suns, wide, strict=True) if not is_wide]
-        open_to_all = [sun for sun, is_wide in zip(suns, wide, strict=True) if is_wide]
+        parts = np.ones(len(suns))
+        if self.in_eevee:
+            parts = part_shadowed(np.array([sun.angular_diameter for sun in suns]))
         wrong = -self.irradiance
-        if shadowed:
-            wrong = wrong + self.surfaces.irradiance(*_pieces(shadowed))
-        if open_to_all:
-            wrong = wrong + self.surfaces.in_the_open().irradiance(*_pieces(open_to_all))
+        for surfaces, lit in (
+            (self.surfaces, parts),
+            (self.surfaces.in_the_open(), 1 - parts),
+        ):
+            given = [(sun, part) for sun, part in zip(suns, lit, strict=True) if part > 0]
+            if given:
+                wrong = wrong + surfaces.irradiance(*_pieces(*zip(*given, strict=True)))
         return float(np.sqrt(np.mean(wrong**2))) / self.mean
 
     def wrong_on_ground(self, suns: Sequence[Sun]) -> float:
@@ -218,12 +221,12 @@ def _parts(flux: Floats, seen: Floats) -> Floats:
     return np.where(total > 0, weighted_sum(seen, flux) / np.where(total > 0, total, 1), np.nan)
 
 
-def _pieces(suns: Sequence[Sun]) -> tuple[Floats, Floats, Floats]:
-    """Each sun, one at least, as points in a spiral over its disc: directions, luminous light and
-    half widths."""
+def _pieces(suns: Sequence[Sun], lit: Sequence[float]) -> tuple[Floats, Floats, Floats]:
+    """Suns, one at least, as points in a spiral over the disc of each: directions, luminous light
+    and half widths. lit: how much of each sun's light."""
     to_light = np.array([sun.to_light for sun in suns])
     axes = np.stack([*sphere.tangents(to_light), to_light], axis=1)
-    light = np.array([sun.scalar_irradiance for sun in suns]) @ LUMINANCE_WEIGHTS
+    light = np.array([sun.scalar_irradiance for sun in suns]) @ LUMINANCE_WEIGHTS * lit
     weight = light * np.sqrt([sun.angular_diameter for sun in suns])
     parts = PIECES * weight / max(weight.sum(), 1e-300)
     counts = np.maximum(np.round(parts).astype(int), FEWEST)

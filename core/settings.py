@@ -25,11 +25,6 @@ TOLERANCE = 1.0
 """Predicted error, in percent of the mean irradiance, that the program allows by itself: side by
 side, eyes tell about so much apart."""
 
-IN_EEVEE = 0.7
-"""So much of it where EEVEE shows the suns, whose shadows there are the less true the wider they
-are, which no prediction counts: with this pictures under Blender's interior and studio lights get
-wrong by 1.8 and 2.3 % instead of 2.2 and 2.6, under others by as much as before."""
-
 OF_OWN_LIGHT = 0.05
 """And as a part of what the suns give: a few faint lights must not become one wide one."""
 
@@ -154,8 +149,7 @@ class ConversionSettings:
         """The tolerance in percent for suns with this share of all light, with None resolved; None
         still where as many lights as asked for are wanted."""
         if self.lights is None and self.tolerance is None:
-            own = IN_EEVEE * TOLERANCE if self.in_eevee else TOLERANCE
-            return min(own, 100 * OF_OWN_LIGHT * share)
+            return min(TOLERANCE, 100 * OF_OWN_LIGHT * share)
         return self.tolerance
 
     def as_dict(self) -> dict[str, object]:

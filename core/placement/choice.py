@@ -109,7 +109,8 @@ def _fewest_by_edge(
     allowed: float,
 ) -> ChosenSuns:
     """As few as are within a part of the mean irradiance."""
-    rough = split_of(_patches(light, strata, FEWEST_SEARCHED), settings.shape)
+    eevee = settings.in_eevee
+    rough = split_of(_patches(light, strata, FEWEST_SEARCHED), settings.shape, eevee)
     share = float(light.luminous_flux.sum()) / strata.light
 
     def expected(count: int) -> float:

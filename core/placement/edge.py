@@ -31,7 +31,9 @@ def edge_suns(
     """At most `lights` suns for light that is cut into patches, one patch at least. level: whether
     level ground must be right as well as shadows. rough: see `edge_split`."""
     share = float((patches.flux @ LUMINANCE_WEIGHTS).sum()) / strata.light
-    cells = edge_split(patches, lights, settings.shape, NO_TRUER / share, level, rough)
+    cells = edge_split(
+        patches, lights, settings.shape, NO_TRUER / share, level, rough, settings.in_eevee
+    )
     notes = ()
     if settings.samples or settings.per_stratum or settings.position == "sample":
         notes = ("Samples, per stratum and position are of the other methods: edge has none.",)

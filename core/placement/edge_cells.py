@@ -12,6 +12,7 @@ import numpy as np
 
 from ..shadow_edges import cap_beyond, edges_across
 from ..suns import disc_diameter, disc_on_ground
+from ..two_orders import part_shadowed
 from .edge_light import FLUX, JUDGED, SEEN, TOTAL, EdgeLight, Floats, Owner, sums_of
 
 TURNS, PLACES = 4, 24
@@ -21,6 +22,9 @@ errors of 4 to 64 lights are the same."""
 GROUND = 1.0
 """How much what level ground gets wrong counts against a shadow's edge anywhere: the horizon is one
 edge that nearly every scene has. With 10, shadows of 4 lights get 15 % worse."""
+
+HIDDEN = 0.5
+"""Of all walls, those that hide a piece of light: what fades of its shadow is wrong behind them."""
 
 CELLS = 512
 """Cells whose edges are held in memory at a time."""
@@ -128,6 +132,8 @@ def _wrong(
     of_disc = cap_beyond(edges.height, half[:, None])
     wrong = edges.beyond - held[:, None, TOTAL] * of_disc[..., None]
     squared = np.einsum("ne,nek->nk", edges.part, wrong**2)
+    if light.fades:
+        squared += HIDDEN * (held[:, TOTAL] * (1 - part_shadowed(2 * half))[:, None]) ** 2
     seen = held[:, TOTAL] * disc_on_ground(to_light[:, 2], half)[:, None]
     on_ground = seen - held[:, SEEN]
     return squared + GROUND * on_ground**2, on_ground

@@ -43,6 +43,7 @@ HELD = SEEN.stop
 class EdgeLight:
     """Patches with what cutting and balancing ask of them.
 
+    fades: whether shadows of wide discs do, as in EEVEE; see `two_orders.part_shadowed`.
     directions: unit vectors, (p, 3). half_width: see `shadow_edges.half_widths`, (p,). part: of the
     light that each is of, 0 or 1, (p,). relative: red, green and blue as parts of the red, green
     and blue of that part, times how much of all light is in it, (p, 3): against the whole map's
@@ -52,6 +53,7 @@ class EdgeLight:
     """
 
     shape: Shape
+    fades: bool
     directions: Floats
     half_width: Floats
     part: Owner
@@ -59,7 +61,9 @@ class EdgeLight:
     held: Floats
 
     @classmethod
-    def of(cls, patches: Patches, shape: Shape, part: Owner | None = None) -> EdgeLight:
+    def of(
+        cls, patches: Patches, shape: Shape, fades: bool = False, part: Owner | None = None
+    ) -> EdgeLight:
         """All in one part, if none are given."""
         if part is None:
             part = np.zeros(len(patches), np.intp)
@@ -71,14 +75,14 @@ class EdgeLight:
         seen = judged * facing_up(patches.directions, half_width)[:, None]
         sums = [patches.flux, relative, vectors.reshape(-1, 9), judged, seen]
         held = np.concatenate(sums, axis=1)
-        return cls(shape, patches.directions, half_width, part, relative, held)
+        return cls(shape, fades, patches.directions, half_width, part, relative, held)
 
     @classmethod
     def joined(cls, lights: Sequence[EdgeLight]) -> EdgeLight:
         """Side by side."""
         names = ("directions", "half_width", "part", "relative", "held")
         arrays = (np.concatenate([getattr(one, name) for one in lights]) for name in names)
-        return cls(lights[0].shape, *arrays)
+        return cls(lights[0].shape, lights[0].fades, *arrays)
 
     def __len__(self) -> int:
         return len(self.part)

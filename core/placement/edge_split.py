@@ -53,20 +53,21 @@ def edge_split(
     allowed: float = 0.0,
     level: bool = False,
     rough: bool = False,
+    fades: bool = False,
 ) -> PatchCells:
     """At most `count` cells: as many as make the predicted error smaller, until it is `allowed`.
 
     patches: some, all of them lit. allowed: a part of all light; see `PatchCells.error`. level:
     whether they are chosen by `PatchCells.level_error` instead. rough: of the first round, in less
-    than half the time; half of all are wrong by less than a fiftieth more.
+    than half the time; half of all are wrong by less than a fiftieth more. fades: see `EdgeLight`.
     """
-    split = split_of(patches, shape)
+    split = split_of(patches, shape, fades)
     return split.rough(count, allowed, level) if rough else split.cells(count, allowed, level)
 
 
-def split_of(patches: Patches, shape: Shape) -> EdgeSplit:
+def split_of(patches: Patches, shape: Shape, fades: bool = False) -> EdgeSplit:
     """The same one each time: cut for one number of cells, patches are cut for all smaller ones."""
-    return patches.once(("split", shape), lambda: EdgeSplit(patches, shape))
+    return patches.once(("split", shape, fades), lambda: EdgeSplit(patches, shape, fades))
 
 
 class EdgeSplit:
@@ -75,10 +76,10 @@ class EdgeSplit:
     patches: some, all of them lit.
     """
 
-    def __init__(self, patches: Patches, shape: Shape) -> None:
-        lights, part = [EdgeLight.of(patches, shape)], two_parts(patches)
+    def __init__(self, patches: Patches, shape: Shape, fades: bool = False) -> None:
+        lights, part = [EdgeLight.of(patches, shape, fades)], two_parts(patches)
         if part is not None:
-            lights.append(EdgeLight.of(patches, shape, part))
+            lights.append(EdgeLight.of(patches, shape, fades, part))
         self._whole, self._truest = lights[0], Cuts(lights[-1], squared_errors)
         self._first: dict[tuple[int, bool], list[Trial]] = {}
         self._best: dict[tuple[int, bool], PatchCells] = {}

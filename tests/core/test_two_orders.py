@@ -10,8 +10,8 @@ from sunsplit.core.patches import Patches, patches_of
 from sunsplit.core.region import light_of_map
 from sunsplit.core.settings import MOST_BY_ITSELF
 from sunsplit.core.tolerances import ACCOUNT
-from sunsplit.core.two_orders import STEEPEST, irradiance_of_two_orders
-from tests.maps import direction, environment, sky
+from sunsplit.core.two_orders import STEEPEST, irradiance_of_two_orders, part_shadowed
+from tests.maps import direction, environment, paint_disc, sky
 
 ANGLES = np.radians([0, 30, 60, 90, 120, 180])
 NORMALS = np.stack([np.sin(ANGLES), np.zeros(6), np.cos(ANGLES)], axis=-1)
@@ -64,3 +64,19 @@ def test_eevee_gets_no_more_lamps_than_help():
     conversion = convert(environment(pixels), ConversionSettings(target="eevee", share=0.6))
     assert conversion.predicted_error > 0.01
     assert len(conversion.suns) < 16
+
+
+def test_the_wider_a_lamp_the_less_of_it_has_shadows():
+    parts = [part_shadowed(np.radians(width)) for width in (0, 45, 90, 150, 180)]
+    assert parts == pytest.approx([1, 1, 2 / 3, 2 / 9, 0])
+
+
+def test_a_wide_lamp_is_wrong_in_eevee_and_several_narrow_ones_less():
+    pixels = sky(256, 0.0)
+    paint_disc(pixels, direction(20, 60), 45, 1)
+    wrong = {}
+    for target, lights in (("cycles", 1), ("eevee", 1), ("eevee", 12)):
+        asked = ConversionSettings(target=target, lights=lights, share=1)
+        wrong[target, lights] = convert(environment(pixels), asked).predicted_error
+    assert wrong["cycles", 1] < 0.01 < wrong["eevee", 1]
+    assert wrong["eevee", 12] < wrong["eevee", 1] / 2
