@@ -334,6 +334,34 @@ def timed(work: Callable, name: str) -> Callable:
     return draw
 
 
+CALLS: list[float] = []
+"""Milliseconds of the extension's operators each time that the window has called one."""
+
+
+def longest_call() -> float:
+    """Of `CALLS` since the last time that this was asked; 0 if there were none."""
+    for cls in bpy.types.Operator.__subclasses__():
+        if cls.__module__.startswith(MODULE) and hasattr(cls, "modal"):
+            for name in ("invoke", "modal"):
+                if not hasattr(getattr(cls, name), "__wrapped__"):
+                    setattr(cls, name, timed_call(getattr(cls, name)))
+    longest = max(CALLS, default=0.0)
+    CALLS.clear()
+    return longest
+
+
+def timed_call(work: Callable) -> Callable:
+    @wraps(work)
+    def call(self: object, context: object, event: object) -> set[str]:
+        started = time.perf_counter()
+        try:
+            return work(self, context, event)
+        finally:
+            CALLS.append(1e3 * (time.perf_counter() - started))
+
+    return call
+
+
 # The Asset Browser
 
 
