@@ -77,8 +77,11 @@ def test_eevee_whose_world_shines_through_the_ground_gets_both_lamps(scene):
     bpy.ops.sunsplit.convert(target="cycles")
     assert heights(scene) == pytest.approx([BELOW[2], ABOVE[2]], abs=1e-3)
     bpy.ops.sunsplit.convert(target="auto")  # and the sky as well
-    lamps = [to_light(lamp) for lamp in suns(scene)]
-    assert all(max(lamp @ sun for lamp in lamps) > 0.9999 for sun in (ABOVE, BELOW))
+    for sun in (ABOVE, BELOW):
+        # Of so many lamps one sun, which is a few pixels, may have two.
+        near = [lamp for lamp in suns(scene) if to_light(lamp) @ sun > np.cos(np.radians(2))]
+        middle = sum(lamp.data.energy * to_light(lamp) for lamp in near)
+        assert middle @ sun > 0.9999 * np.linalg.norm(middle)
 
 
 def test_what_is_visible_turns_with_the_world(scene):
