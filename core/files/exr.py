@@ -16,6 +16,7 @@ from ..pixels import HeldPixels, MapSize, Pixels, Strip
 from ..reduction import narrowed, rows_of, total_light
 from ..tolerances import HALF_ENERGY, HALF_MAXIMUM
 from . import image
+from .cores_of_openexr import on_all_cores
 from .exr_layers import Channel, Layer, choose_layer
 from .limits import (
     MAXIMUM_PIXELS,
@@ -259,6 +260,7 @@ def write(
         with (
             path.open("wb") as stream,
             quiet_libraries(),
+            on_all_cores(),
             OpenEXR.File(header, {"RGB": stored}) as file,
         ):
             file.write(stream)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..cores import usable
 from ..pixels import Strip
 from . import image
+from .cores_of_openexr import on_all_cores
 from .limits import damaged_exr, too_large_for_memory
 from .quiet import quiet_libraries
 
@@ -100,12 +100,10 @@ def _is_unicode(path: Path) -> bool:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[InputFile]:
-    """For reading on all cores that there are for us."""
     import OpenEXR
 
     with ExitStack() as stack:
-        stack.callback(OpenEXR.set_global_thread_count, OpenEXR.global_thread_count())
-        OpenEXR.set_global_thread_count(usable())
+        stack.enter_context(on_all_cores())
         try:
             # By its name: many threads cannot read from one stream of Python's.
             with quiet_libraries():
