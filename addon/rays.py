@@ -23,8 +23,8 @@ of it. What is bright and was not met is asked for by itself."""
 LEAST_PLACES = 100
 """In each of several frames, as those next to each other show nearly the same."""
 
-ENOUGH = 300
-"""Looks that escaped, over all frames so far: with them these fewest places suffice."""
+ENOUGH, FEWEST = 200, 60
+"""So many looks that escaped, over all frames so far, suffice with so few places in each."""
 
 PATHS = 2
 """So many for each of these places at most: some pictures show little but the world."""
@@ -90,7 +90,7 @@ class Reach:
         that meets nothing finds none."""
         known = sum(place.moment == moment.number for place in self.places)
         for _ in range(paths):
-            if known >= (count if len(self.escaped) < enough else LEAST_PLACES):
+            if known >= (count if len(self.escaped) < enough else FEWEST):
                 return
             before = len(self.places)
             self.follow_another(moment)
