@@ -27,7 +27,8 @@ ENOUGH, FEWEST = 200, 60
 """So many looks that escaped, over all frames so far, suffice with so few places in each."""
 
 PATHS = 2
-"""So many for each of these places at most: some pictures show little but the world."""
+"""So many for each of the places that are wanted, at most: some pictures show little but the
+world."""
 
 MOST_PLACES = 10_000
 """In each frame, if it must be known that something bright reaches none of them."""

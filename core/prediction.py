@@ -206,8 +206,10 @@ class Prediction:
         """What walls on level ground get wrong of luminance, root mean square, as a part of the
         mean irradiance in the open; None where the ground does not hide what is below the
         horizon."""
-        if not len(suns) or self.standing is None:
+        if self.standing is None:
             return None
+        if not len(suns):
+            return 0.0
         flux = np.array([sun.scalar_irradiance for sun in suns]) @ LUMINANCE_WEIGHTS
         half = np.array([sun.angular_diameter / 2 for sun in suns])
         seen = discs_on_walls(np.array([sun.to_light for sun in suns]), half)

@@ -54,8 +54,7 @@ class ChosenSuns:
     predicted_error: see `prediction.Prediction`. ground_error: of the irradiance of level ground in
     the open, by the worst channel. Both nan before they are known. standing_error: what walls on
     that ground get wrong, root mean square, as a part of the mean irradiance; None where that is
-    not predicted. taken: the light of
-    each, None without suns.
+    not predicted. taken: the light of each, None without suns.
     """
 
     suns: tuple[Sun, ...]

@@ -128,7 +128,8 @@ def test_the_best_of_too_few_are_cut_with_care(sunrise, monkeypatch, lights):
     """Numbers that are clearly too few are told by rough cells, but none is kept with these."""
     asked = ConversionSettings(share=1, lights=lights, tolerance=0.1)
     quick = convert(load(sunrise), asked)
-    monkeypatch.setattr(choice, "HOPELESS", np.inf)
+    for limit in ("HOPELESS", "OFF_LEVEL"):
+        monkeypatch.setattr(choice, limit, np.inf)
     careful = convert(load(sunrise), asked)
     assert wrong(quick) <= 1.02 * wrong(careful)
 
