@@ -28,9 +28,12 @@ Floats = NDArray[np.float64]
 LUMINANCE_WEIGHTS = np.array([0.2126, 0.7152, 0.0722])
 """Rec.709 luminance of linear RGB (ITU-R BT.709)."""
 
-ROWS = 512
-"""Read at a time, about: DWAB, the coarsest compression of OpenEXR, packs 256 together, and two
-packs keep two cores busy."""
+ROWS = 128
+"""Read at a time, about: OpenEXR keeps Python's lock meanwhile, and a window waits. 512 rows of a
+map 4,096 wide take it for 40 ms, so many for 24, and the whole map takes as long."""
+
+PACKS = 2
+"""At least so many of what a file packs together, to keep two cores busy: DWAB packs 256 rows."""
 
 FEWER_ROWS = 256
 """The same where one core works on them, and needs several copies."""
@@ -161,7 +164,8 @@ def _on_all_cores(
     waiting: deque[tuple[int, Future[_Found]]] = deque()
     top = 0
     with ThreadPoolExecutor(cores) as pool:
-        for strip in raw.strips(sums.rows * max(round(ROWS / sums.rows), 1)):
+        wanted = max(ROWS, PACKS * raw.least_rows)
+        for strip in raw.strips(sums.rows * max(round(wanted / sums.rows), 1)):
             progress("reading", top / raw.height)
             for first in range(0, len(strip[0]), sums.rows):
                 part = tuple(plane[first : first + sums.rows] for plane in strip)
