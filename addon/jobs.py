@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import queue
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -18,6 +20,10 @@ AT_A_TIME = 0.015
 
 TICK = 0.01
 """Seconds between ticks."""
+
+NICENESS = 10
+"""Of a thread and those that it starts: a window that wants to be drawn has ten times its share of
+the cores. No more than that, as libraries may keep threads that they start meanwhile."""
 
 HANDLERS = ("undo_pre", "redo_pre", "load_pre")
 """What takes the data away that steps hold on to."""
@@ -154,7 +160,15 @@ class Job:
 
 
 def _work(answer: Future, apart: Apart, listen: Callable, in_main: Callable) -> None:
+    _give_way()
     try:
         answer.set_result(apart.work(apart.heard_by(listen), in_main))
     except BaseException as wrong:
         answer.set_exception(wrong)
+
+
+def _give_way() -> None:
+    """Let the window go first; only Linux has that for a single thread."""
+    if sys.platform == "linux":
+        thread = os.PRIO_PROCESS, threading.get_native_id()
+        os.setpriority(*thread, max(os.getpriority(*thread), NICENESS))

@@ -35,7 +35,7 @@ map 4,096 wide take it for 40 ms, so many for 24, and the whole map takes as lon
 PACKS = 2
 """At least so many of what a file packs together, to keep two cores busy: DWAB packs 256 rows."""
 
-FEWER_ROWS = 256
+ROWS_ON_ONE_CORE = 256
 """The same where one core works on them, and needs several copies."""
 
 NUMBERS = 1 << 16
@@ -108,7 +108,7 @@ def narrowed(pixels: Pixels, width: int) -> NDArray[np.float32]:
 def rows_of(pixels: Pixels, step: int = 1) -> int:
     """To read at a time: a multiple of `step`."""
     least = int(np.lcm(step, pixels.least_rows))
-    return least * max(round(FEWER_ROWS / least), 1)
+    return least * max(round(ROWS_ON_ONE_CORE / least), 1)
 
 
 def total_light(strip: Strip, solid: Floats) -> Floats:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import bpy
 import numpy as np
 import pytest
 
 from sunsplit.addon import known
-from sunsplit.addon.jobs import AT_A_TIME, Job
+from sunsplit.addon.jobs import AT_A_TIME, NICENESS, Job
 from sunsplit.addon.options import SceneOptions
 from sunsplit.addon.restoring import restore_scene
 from sunsplit.addon.scene import conversion_steps, convert_scene
@@ -186,6 +189,24 @@ def test_a_thread_may_ask_for_steps_in_the_main_thread(scene):
     assert job.result == "answer"
     assert seen == [main] * 3
     assert run_at_once(asking()) == "answer"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has that for a thread")
+def test_the_thread_gives_way_to_the_window():
+    def niceness(*_):
+        with ThreadPoolExecutor(1) as pool:
+            helper = pool.submit(threading.get_native_id).result()
+            ids = threading.get_native_id(), helper
+            return [os.getpriority(os.PRIO_PROCESS, thread) for thread in ids]
+
+    def asking():
+        return (yield Apart(niceness, 0, 1))
+
+    before = os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+    job = Job(asking())
+    ended(job)
+    assert job.result == [max(before, NICENESS)] * 2
+    assert os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) == before
 
 
 @pytest.mark.parametrize("why", ["undo", "load"])
