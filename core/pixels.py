@@ -30,6 +30,11 @@ class Pixels(Protocol):
         """Strips must have a multiple of so many."""
         ...
 
+    @property
+    def packed_rows(self) -> int:
+        """A file packs so many together: what takes fewer at a time unpacks them more than once."""
+        ...
+
     def strips(self, rows: int) -> Iterator[Strip]:
         """From the top, so many rows at a time (fewer at the end): red, green and blue,
         (rows, width) each, of any type of number."""
@@ -66,6 +71,10 @@ class HeldPixels:
 
     @property
     def least_rows(self) -> int:
+        return 1
+
+    @property
+    def packed_rows(self) -> int:
         return 1
 
     def strips(self, rows: int) -> Iterator[Strip]:

@@ -108,7 +108,7 @@ def narrowed(pixels: Pixels, width: int) -> NDArray[np.float32]:
 def rows_of(pixels: Pixels, step: int = 1) -> int:
     """To read at a time: a multiple of `step`."""
     least = int(np.lcm(step, pixels.least_rows))
-    return least * max(round(ROWS_ON_ONE_CORE / least), 1)
+    return least * max(round(max(ROWS_ON_ONE_CORE, pixels.packed_rows) / least), 1)
 
 
 def total_light(strip: Strip, solid: Floats) -> Floats:
@@ -164,7 +164,7 @@ def _on_all_cores(
     waiting: deque[tuple[int, Future[_Found]]] = deque()
     top = 0
     with ThreadPoolExecutor(cores) as pool:
-        wanted = max(ROWS, PACKS * raw.least_rows)
+        wanted = max(ROWS, PACKS * raw.packed_rows)
         for strip in raw.strips(sums.rows * max(round(wanted / sums.rows), 1)):
             progress("reading", top / raw.height)
             for first in range(0, len(strip[0]), sums.rows):

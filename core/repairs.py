@@ -141,6 +141,10 @@ class RepairedPixels:
     def least_rows(self) -> int:
         return self.raw.least_rows
 
+    @property
+    def packed_rows(self) -> int:
+        return self.raw.packed_rows
+
     def strips(self, rows: int) -> Iterator[Strip]:
         """See `Pixels`."""
         if not self.damaged:

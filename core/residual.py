@@ -78,6 +78,11 @@ class LevelledPixels:
         """See `Pixels`."""
         return self.height // len(self.residual)
 
+    @property
+    def packed_rows(self) -> int:
+        """See `Pixels`."""
+        return self.environment.pixels.packed_rows
+
     def strips(self, rows: int) -> Iterator[Strip]:
         """See `Pixels`."""
         solid = sphere.row_solid_angles(self.width, self.height)

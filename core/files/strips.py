@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,11 @@ UNREADABLE = (RuntimeError, ValueError, TypeError, KeyError, OSError)
 """What OpenEXR raises for files that it cannot read."""
 
 
+FEW_PACKED = 32
+"""Rows, at most, that a compression packs together unless it is one of these."""
+
+MANY_PACKED = {"DWAB_COMPRESSION": 256, "HTJ2K256_COMPRESSION": 256}
+
 _NUMPY = {"HALF": np.dtype(np.float16), "FLOAT": np.dtype(np.float32)}
 
 
@@ -31,7 +36,7 @@ class ExrPixels:
     """The pixels of an OpenEXR file of one part; see `pixels.Pixels`.
 
     channels: names of red, green and blue. first: row of the data window. pixel: the type that all
-    three are stored in.
+    three are stored in. packed_rows: see `pixels.Pixels`.
     """
 
     path: Path
@@ -40,6 +45,7 @@ class ExrPixels:
     height: int
     first: int
     pixel: np.dtype
+    packed_rows: int
 
     @classmethod
     def of(
@@ -52,9 +58,11 @@ class ExrPixels:
         if not hasattr(OpenEXR, "InputFile") or not _is_unicode(path):
             return None
         with _opened(path) as file:
-            types = {str(file.header()["channels"][name].type) for name in channels}
+            header = file.header()
+        types = {str(header["channels"][name].type) for name in channels}
         pixel = _NUMPY.get(types.pop()) if len(types) == 1 else None
-        return cls(path, channels, *size, first, pixel) if pixel else None
+        packed = _packed_rows(header)
+        return cls(path, channels, *size, first, pixel, packed) if pixel else None
 
     @property
     def least_rows(self) -> int:
@@ -88,6 +96,14 @@ class ExrPixels:
             for name, one in zip(names, stored, strict=True)
         }
         return tuple(planes[name] for name in self.channels)
+
+
+def _packed_rows(header: dict[str, Any]) -> int:
+    """Of a file with such a header; tiles may have any height."""
+    tiles = header.get("tiles")
+    if tiles is not None:
+        return tiles.ySize
+    return MANY_PACKED.get(str(header["compression"]).rpartition(".")[2], FEW_PACKED)
 
 
 def _is_unicode(path: Path) -> bool:
@@ -124,6 +140,10 @@ class HdrPixels:
 
     @property
     def least_rows(self) -> int:
+        return 1
+
+    @property
+    def packed_rows(self) -> int:
         return 1
 
     def strips(self, rows: int) -> Iterator[Strip]:

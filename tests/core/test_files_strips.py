@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -22,6 +23,7 @@ from sunsplit.core.pixels import whole
 from sunsplit.core.settings import ConversionSettings
 from sunsplit.core.tolerances import ACCOUNT, ACCOUNT_FLOAT32, ACCOUNT_HALF
 from tests.files import noise
+from tools.fuzz_mutations import attributes
 
 WIDTH = 2048
 
@@ -79,10 +81,36 @@ def test_rows_of_an_exr_are_those_of_the_whole(tmp_path, pixels, compression, ki
     assert (np.concatenate(rows) == stored(path)).all()
 
 
+@pytest.mark.parametrize(
+    "compression",
+    ["NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "DWAA", "DWAB", "HTJ2K32", "HTJ2K256"],
+)
+def test_no_file_packs_more_rows_together_than_are_expected(tmp_path, pixels, compression):
+    path = tmp_path / "map.exr"
+    write_exr(path, pixels, compression)
+    expected = exr.read(path)[0].packed_rows
+    found = packs(path)
+    assert -(-(WIDTH // 2) // expected) <= found
+    assert expected <= 32 or -(-(WIDTH // 2) // expected) == found
+
+
+def packs(path: Path) -> int:
+    """In an OpenEXR file of scan lines: a table of where each begins follows the attributes."""
+    content = path.read_bytes()
+    table = 1 + next(
+        one.value_at + one.size
+        for one in attributes(content)
+        if content[one.value_at + one.size] == 0
+    )
+    (first,) = struct.unpack_from("<Q", content, table)
+    return (first - table) // 8
+
+
 @pytest.mark.parametrize("levels", [False, True])
 def test_tiles_are_read_by_rows_too(tmp_path, pixels, levels):
     path = tmp_path / "map.exr"
     write_image(path, pixels, tile=64, levels=levels)
+    assert exr.read(path)[0].packed_rows == 64
     assert (whole(exr.read(path)[0]) == stored(path)).all()
     assert load(path).own_width == WIDTH
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -37,6 +37,8 @@ class Raw:
 
     radiance: np.ndarray
     least_rows: int = 1
+    packed_rows: int = 1
+    asked: list[int] = field(default_factory=list)
 
     @property
     def width(self) -> int:
@@ -47,6 +49,7 @@ class Raw:
         return self.radiance.shape[0]
 
     def strips(self, rows: int) -> Iterator[tuple[np.ndarray, ...]]:
+        self.asked.append(rows)
         for top in range(0, self.height, rows):
             yield tuple(np.moveaxis(self.radiance[top : top + rows], -1, 0).copy())
 
@@ -90,6 +93,17 @@ def test_sums_do_not_depend_on_how_many_rows_are_read(monkeypatch):
         assert (found.radiance == expected.radiance).all()
         assert (found.direction == expected.direction).all()
         assert (found.scalar_irradiance == expected.scalar_irradiance).all()
+
+
+@pytest.mark.parametrize("packed", [1, 32, 256])
+def test_what_is_packed_together_is_unpacked_once_and_keeps_two_cores_busy(packed):
+    pixels = Raw(noise(1024), packed_rows=packed)
+    reduced(pixels, 64)
+    (rows,) = pixels.asked
+    assert rows % packed == 0
+    assert rows >= max(2 * packed, reduction.ROWS)
+    narrowed(pixels, 64)
+    assert pixels.asked[1] % packed == 0
 
 
 def test_sums_do_not_depend_on_how_many_cores_there_are(monkeypatch):
