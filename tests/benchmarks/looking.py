@@ -1,11 +1,12 @@
 """What looking at a scene costs, and how soon another setting answers.
 
-    .venv-5.2/bin/python -m tests.benchmarks.looking MAP [-o FOLDER] [--width 4096] ...
+    .venv-5.2/bin/python -m tests.benchmarks.looking MAP ... [-o FOLDER] [--width 4096] ...
 
 Looking at a scene of many triangles, of many objects, and of a forest of many instances, each also
 while its camera turns; at a scene where nothing can be skipped,
-as a part of converting and rendering it, interleaved with and without; and converting again with
-another number of lights, another share, and with the world turned. Medians.
+as a part of converting and rendering it, interleaved with and without, all under the first map;
+and under each map, converting again with another number of lights, another share, and with the
+world turned. Medians.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ from tests.blender import (
     diffuse,
     material,
     plate_mesh,
+    suns,
     timed_render,
 )
 
@@ -167,39 +169,50 @@ def _look(scene: bpy.types.Scene, environment: EnvironmentMap, light: WorldLight
     visible_part(environment, _reach(scene).looks(light.map_from_world, run_at_once))
 
 
-def changes(path: Path, options: argparse.Namespace) -> list[Result]:
+@dataclass(frozen=True)
+class Changes:
+    """Of one map: seconds to convert it first, and again with another number of lights, another
+    share and the world turned. suns: that Sunsplit makes of it by itself."""
+
+    name: str
+    suns: int
+    first: float
+    lights: float
+    share: float
+    turned: float
+
+
+def changes(path: Path, options: argparse.Namespace) -> Changes:
     """Converting again after a change."""
-    found = []
     with tempfile.TemporaryDirectory() as name:
         scene = SCENES["outdoor"](enlarged(path, options.width, Path(name)), 96)
         texture = next(n for n in scene.world.node_tree.nodes if n.type == "TEX_ENVIRONMENT")
         mapping = add_mapping(texture)
         known.forget()
-        found.append(Result("convert, first", _convert(scene)))
+        first = _convert(scene)
+        lamps = len(suns(scene))
         _convert(scene, lights=8)
         lights = [_convert(scene, lights=n) for n in (16, 4, 12, 6, 10)]
-        found.append(Result("another number of lights", float(np.median(lights))))
         shares = [_convert(scene, share=s) for s in (0.5, 0.6, 0.55, 0.7, 0.65)]
-        found.append(Result("another share", float(np.median(shares[1:]))))
         _convert(scene)
         turns = []
         for turn in (0.1, 0.2, 0.3, 0.4, 0.5):
             nodes = scene.world.node_tree.nodes
             nodes[mapping.name].inputs["Rotation"].default_value[2] = turn
             turns.append(_convert(scene))
-        found.append(Result("the world turned", float(np.median(turns))))
-    return found
+    again = (float(np.median(times)) for times in (lights, shares[1:], turns))
+    return Changes(path.stem, lamps, first, *again)
 
 
 def _convert(scene: bpy.types.Scene, **chosen: object) -> float:
     return seconds(lambda: convert_scene(scene, ConversionSettings(**chosen)))
 
 
-def main(arguments: Sequence[str] | None = None) -> list[Result]:
+def main(arguments: Sequence[str] | None = None) -> tuple[list[Result], list[Changes]]:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("map", type=Path, metavar="MAP")
+    parser.add_argument("maps", nargs="+", type=Path, metavar="MAP")
     parser.add_argument("-o", "--output", type=Path, default=Path("out"))
-    parser.add_argument("--width", type=int, default=4096, help="of the map that is changed")
+    parser.add_argument("--width", type=int, default=4096, help="of the maps that are changed")
     parser.add_argument("--side", type=int, default=707, help="squares along the hills")
     parser.add_argument("--objects", type=int, default=5000)
     parser.add_argument("--instances", type=int, default=20_000)
@@ -208,14 +221,14 @@ def main(arguments: Sequence[str] | None = None) -> list[Result]:
     parser.add_argument("--repeats", type=int, default=5)
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)
-    path = options.map.resolve()
+    path = options.maps[0].resolve()
     results = looks(path, options)
     looked, made = overhead(path, options)
-    results += changes(path, options)
+    changed = [changes(one.resolve(), options) for one in options.maps]
     lines = [
         "# What looking at a scene costs, and how soon another setting answers",
         "",
-        f"Blender {bpy.app.version_string}, {path.stem}; changes on the map enlarged to "
+        f"Blender {bpy.app.version_string}, {path.stem}; changes on maps enlarged to "
         f"{options.width} pixels. Seconds, medians.",
         "",
         "| what | seconds |",
@@ -225,9 +238,19 @@ def main(arguments: Sequence[str] | None = None) -> list[Result]:
         f"Where nothing can be skipped, looking takes {looked / made:.1%} of what converting and "
         f"rendering with {options.samples} samples takes ({looked:.3f} of {made:.2f} s, "
         "interleaved).",
+        "",
+        "| map | suns | convert, first | another number of lights | another share | turned |",
+        "| --- | --- | --- | --- | --- | --- |",
+        *(
+            f"| {one.name} | {one.suns} | {one.first:.2f} | {one.lights:.3f} | {one.share:.3f} "
+            f"| {one.turned:.3f} |"
+            for one in changed
+        ),
     ]
-    (options.output / "looking.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return results
+    text = "\n".join(lines) + "\n"
+    (options.output / "looking.md").write_text(text, encoding="utf-8")
+    print(text)
+    return results, changed
 
 
 if __name__ == "__main__":

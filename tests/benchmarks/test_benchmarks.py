@@ -71,10 +71,11 @@ def test_region_a(tmp_path, monkeypatch, sunrise):
 def test_looking(tmp_path, sunrise):
     few = ["--width", "0", "--side", "20", "--objects", "30", "--size", "48", "--samples", "1"]
     few += ["--instances", "40"]
-    results = looking.main([str(sunrise), *few, "--repeats", "1", "-o", str(tmp_path)])
+    results, changed = looking.main([str(sunrise), *few, "--repeats", "1", "-o", str(tmp_path)])
     assert all(one.seconds > 0 for one in results)
+    assert all(one.suns and min(one.first, one.lights, one.share) > 0 for one in changed)
     lines = (tmp_path / "looking.md").read_text().splitlines()
-    assert sum(line.startswith("| ") for line in lines) == 2 + len(results)
+    assert sum(line.startswith("| ") for line in lines) == 4 + len(results) + len(changed)
 
 
 @once
