@@ -3,7 +3,7 @@ openings that it comes in through."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 
@@ -16,7 +16,7 @@ from ..core.settings import ConversionSettings
 from ..core.visible import VisiblePart, through_openings, visible_part
 from .images import READ
 from .known import known_conversion
-from .portals import ClosedScene, closed_scene, has_portals
+from .portals import closed_scene, has_portals
 from .rays import Reach
 from .scene_needs import SceneNeeds
 from .steps import Apart, Steps
@@ -24,6 +24,11 @@ from .world import WorldLight, is_animated
 
 MADE = 0.9
 """Of the time of a conversion, about, until its maps are written."""
+
+
+SMALL = 0.1
+"""Of the half sphere above a place, openings that leave most of the light outside. A window takes
+.015 of it in the room of docs/benchmarks/portals.md."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +62,18 @@ def fitted_conversion(
     """Convert the map that lights a scene; in a closed one for Cycles with portals or without,
     whichever is predicted to be less noisy."""
 
+    reach = yield from _reach(scene, needs)
+    visible = yield from _what_is_visible(reach, environment, settings, light)
+    closed = (yield from closed_scene(reach)) if reach else None
+    settings = replace(settings, closed=closed is not None and closed.part < SMALL)
+
     def convert(part: VisiblePart | None) -> Apart:
         return Apart(
             lambda listen, _: known_conversion(environment, settings, part, listen), READ, MADE
         )
 
-    reach = yield from _reach(scene, needs)
-    visible = yield from _what_is_visible(reach, environment, settings, light)
-    closed = yield from _closed(scene, reach, settings)
-    if closed is None:
+    # Where the user has made portals, or no light is left for any, there is nothing to decide.
+    if closed is None or has_portals(scene) or not settings.leaves_residual:
         return Fitted((yield convert(visible)))
     told = Fitted((yield convert(through_openings(visible, closed.part))), closed.openings)
     untold = Fitted((yield convert(visible)))
@@ -98,12 +106,3 @@ def _what_is_visible(
             lambda _, in_main: visible_part(environment, reach.looks(to_map, in_main)), READ, READ
         )
     )
-
-
-def _closed(
-    scene: bpy.types.Scene, reach: Reach | None, settings: ConversionSettings
-) -> Steps[ClosedScene | None]:
-    """The scene's openings where portals may help; None where the user has made some."""
-    if reach is None or not settings.leaves_residual or has_portals(scene):
-        return None
-    return (yield from closed_scene(reach))

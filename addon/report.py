@@ -49,6 +49,9 @@ def made_sentences(conversion: Conversion) -> list[str]:
     lines = []
     if conversion.suns:
         lines.append(predicted(conversion))
+        if conversion.settings.tightens:
+            text = said("In a closed scene little light comes in, so lamps are truer than usual.")
+            lines.append(text)
     if conversion.residual is not None:
         error = conversion.account.relative_error.max()
         lines.append(said("Account: lamps + world = map within {error:.0e}").format(error=error))

@@ -28,6 +28,12 @@ side, eyes tell about so much apart."""
 OF_OWN_LIGHT = 0.05
 """And as a part of what the suns give: a few faint lights must not become one wide one."""
 
+IN_CLOSED = 0.4
+"""So much of both is allowed in a closed scene: what its openings let in is a small part of what is
+outside, and their edges stand before the light for all of it. A room under ten maps is wrong by a
+third of what it would be, for a tenth more time in the middle (docs/benchmarks/portals.md); with
+less allowed, suns by the hundred cost more noise than they mend."""
+
 MOST_BY_ITSELF = {"cycles": 256, "eevee": 32, "both": 32, "export": 256}
 """So many lights at most are chosen by themselves. In EEVEE each draws and searches a shadow map of
 its own, in every frame."""
@@ -68,6 +74,8 @@ class ConversionSettings:
         as few as shadows and rough surfaces need, see `lighting_width`, or None: about 1,024;
         mirrors and backgrounds may show that it is not sharp.
     residual_samples: how many samples a Voronoi map is made of.
+    closed: whether what is lit is a closed scene that light enters through openings: there the
+        program allows itself less.
     mirrors: whether something may show the residual sharply. Where nothing does, suns in EEVEE may
         hold all light, as what is left would be without shadows.
     fill: what the residual shows in region A: its "surroundings", with only what exceeds them
@@ -89,6 +97,7 @@ class ConversionSettings:
     residual: ResidualKind = "map"
     residual_width: ResidualWidth = None
     residual_samples: int = 500
+    closed: bool = False
     mirrors: bool = True
     fill: Fill | None = None
 
@@ -145,12 +154,26 @@ class ConversionSettings:
         """The number of lights that must not be exceeded."""
         return MOST_BY_ITSELF[self.target] if self.lights is None else self.lights
 
+    @property
+    def tolerated(self) -> float:
+        """The tolerance in percent, with None resolved: see `allowed_error`."""
+        return TOLERANCE * self._strictness if self.tolerance is None else self.tolerance
+
     def allowed_error(self, share: float) -> float | None:
         """The tolerance in percent for suns with this share of all light, with None resolved; None
         still where as many lights as asked for are wanted."""
         if self.lights is None and self.tolerance is None:
-            return min(TOLERANCE, 100 * OF_OWN_LIGHT * share)
+            return min(self.tolerated, 100 * OF_OWN_LIGHT * share * self._strictness)
         return self.tolerance
+
+    @property
+    def tightens(self) -> bool:
+        """Whether the program allows itself less than usual."""
+        return self.closed and self.lights is None and self.tolerance is None
+
+    @property
+    def _strictness(self) -> float:
+        return IN_CLOSED if self.closed else 1.0
 
     def as_dict(self) -> dict[str, object]:
         return asdict(self)

@@ -19,7 +19,7 @@ from .noise import OTHERWISE, squared_noise
 from .placement.choice import choose_suns
 from .placement.placement import ChosenSuns
 from .region import RegionLight
-from .settings import TOLERANCE, ConversionSettings
+from .settings import ConversionSettings
 from .strata import Strata
 
 Floats = NDArray[np.float64]
@@ -80,7 +80,7 @@ def suns_for_whole_lights(
         evil = chosen.predicted_error**2 + noise[k]
         if evil < least:
             best, least = (count, chosen), evil
-        if chosen.predicted_error <= (settings.tolerance or TOLERANCE) / 100:
+        if chosen.predicted_error <= settings.tolerated / 100:
             break
     count, chosen = best
     why = "too faint to make noise"

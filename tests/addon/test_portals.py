@@ -8,6 +8,9 @@ import pytest
 from mathutils import Matrix
 
 from sunsplit.addon import known
+from sunsplit.addon.restoring import restore_scene
+from sunsplit.addon.scene import convert_scene
+from sunsplit.core.settings import IN_CLOSED, ConversionSettings
 from tests.addon.test_convert import inventory
 from tests.blender import (
     add_mesh,
@@ -202,6 +205,27 @@ def test_a_sun_through_the_window_that_gives_nearly_all_light_needs_none(tmp_pat
     bpy.ops.sunsplit.convert()
     assert suns(scene)
     assert not portals(scene)
+
+
+def test_lamps_of_a_closed_scene_are_truer_whoever_makes_portals(sunrise):
+    for change in (no_roof, None, users_portal):
+        scene = room(sunrise)
+        if change:
+            change(scene)
+        bpy.context.view_layer.update()
+        known.forget()
+        found = convert_scene(scene, ConversionSettings()).conversion
+        is_closed = change is not no_roof
+        assert found.settings.closed == is_closed
+        assert ("In a closed scene" in scene.sunsplit.report) == is_closed
+        if is_closed:
+            assert found.predicted_error <= IN_CLOSED / 100
+        else:
+            assert found.predicted_error > IN_CLOSED / 100
+        restore_scene(scene)
+    found = convert_scene(scene, ConversionSettings(lights=2)).conversion
+    assert len(found.suns) <= 2
+    assert "In a closed scene" not in scene.sunsplit.report
 
 
 def test_a_ground_under_the_sky_has_no_openings(overcast):
