@@ -114,7 +114,8 @@ def test_what_level_ground_gets_wrong(sunrise, lights):
 def test_the_program_allows_itself_less_in_a_closed_scene(share):
     usual, closed = ConversionSettings(), ConversionSettings(closed=True)
     assert closed.allowed_error(share) == pytest.approx(IN_CLOSED * usual.allowed_error(share))
-    assert closed.tightens and not usual.tightens
+    assert closed.tightens
+    assert not usual.tightens
     for chosen in ({"tolerance": 2.0}, {"lights": 3}, {"lights": 3, "tolerance": 2.0}):
         asked = ConversionSettings(closed=True, **chosen)
         assert asked.allowed_error(share) == ConversionSettings(**chosen).allowed_error(share)
