@@ -27,6 +27,7 @@ FEW_PACKED = 32
 """Rows, at most, that a compression packs together unless it is one of these."""
 
 MANY_PACKED = {"DWAB_COMPRESSION": 256, "HTJ2K256_COMPRESSION": 256}
+"""The same of those that pack more, by OpenEXR's names."""
 
 _NUMPY = {"HALF": np.dtype(np.float16), "FLOAT": np.dtype(np.float32)}
 
@@ -100,10 +101,15 @@ class ExrPixels:
 
 def _packed_rows(header: dict[str, Any]) -> int:
     """Of a file with such a header; tiles may have any height."""
+    import OpenEXR
+
     tiles = header.get("tiles")
     if tiles is not None:
         return tiles.ySize
-    return MANY_PACKED.get(str(header["compression"]).rpartition(".")[2], FEW_PACKED)
+    # By number, as the header's own words are fewer than there are compressions.
+    number = header["compression"].v
+    found = (rows for name, rows in MANY_PACKED.items() if int(getattr(OpenEXR, name)) == number)
+    return next(found, FEW_PACKED)
 
 
 def _is_unicode(path: Path) -> bool:

@@ -83,7 +83,20 @@ def test_rows_of_an_exr_are_those_of_the_whole(tmp_path, pixels, compression, ki
 
 @pytest.mark.parametrize(
     "compression",
-    ["NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "DWAA", "DWAB", "HTJ2K32", "HTJ2K256"],
+    [
+        "NO",
+        "RLE",
+        "ZIPS",
+        "ZIP",
+        "PIZ",
+        "PXR24",
+        "B44",
+        "DWAA",
+        "DWAB",
+        "HTJ2K32",
+        "HTJ2K256",
+        "ZSTD",
+    ],
 )
 def test_no_file_packs_more_rows_together_than_are_expected(tmp_path, pixels, compression):
     path = tmp_path / "map.exr"
