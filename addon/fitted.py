@@ -26,6 +26,12 @@ MADE = 0.9
 """Of the time of a conversion, about, until its maps are written."""
 
 
+IN_CLOSED = 0.4
+"""Strictness in a closed scene, whose openings' edges stand before all the little light that comes
+in. A room under nine maps was up to 15 % wrong with 1, is up to 7 % with this, for a tenth more
+time in the middle (docs/benchmarks/portals.md). With less, suns by the hundred cost more noise than
+they mend, and a sun of a few pixels is cut into many."""
+
 SMALL = 0.1
 """Of the half sphere above a place, openings that leave most of the light outside. A window takes
 .015 of it in the room of docs/benchmarks/portals.md."""
@@ -61,11 +67,12 @@ def fitted_conversion(
 ) -> Steps[Fitted]:
     """Convert the map that lights a scene; in a closed one for Cycles with portals or without,
     whichever is predicted to be less noisy."""
-
     reach = yield from _reach(scene, needs)
     visible = yield from _what_is_visible(reach, environment, settings, light)
     closed = (yield from closed_scene(reach)) if reach else None
-    settings = replace(settings, closed=closed is not None and closed.part < SMALL)
+    is_dim = closed is not None and closed.part < SMALL
+
+    settings = replace(settings, strictness=IN_CLOSED if is_dim else 1.0)
 
     def convert(part: VisiblePart | None) -> Apart:
         return Apart(

@@ -28,12 +28,6 @@ side, eyes tell about so much apart."""
 OF_OWN_LIGHT = 0.05
 """And as a part of what the suns give: a few faint lights must not become one wide one."""
 
-IN_CLOSED = 0.4
-"""So much of both is allowed in a closed scene: what its openings let in is a small part of what is
-outside, and their edges stand before the light for all of it. A room under ten maps is wrong by a
-third of what it would be, for a tenth more time in the middle (docs/benchmarks/portals.md); with
-less allowed, suns by the hundred cost more noise than they mend."""
-
 MOST_BY_ITSELF = {"cycles": 256, "eevee": 32, "both": 32, "export": 256}
 """So many lights at most are chosen by themselves. In EEVEE each draws and searches a shadow map of
 its own, in every frame."""
@@ -74,8 +68,8 @@ class ConversionSettings:
         as few as shadows and rough surfaces need, see `lighting_width`, or None: about 1,024;
         mirrors and backgrounds may show that it is not sharp.
     residual_samples: how many samples a Voronoi map is made of.
-    closed: whether what is lit is a closed scene that light enters through openings: there the
-        program allows itself less.
+    strictness: of the error that the program allows by itself, so much is allowed: less where what
+        is lit gets so little of the light that what is wrong of it shows.
     mirrors: whether something may show the residual sharply. Where nothing does, suns in EEVEE may
         hold all light, as what is left would be without shadows.
     fill: what the residual shows in region A: its "surroundings", with only what exceeds them
@@ -97,7 +91,7 @@ class ConversionSettings:
     residual: ResidualKind = "map"
     residual_width: ResidualWidth = None
     residual_samples: int = 500
-    closed: bool = False
+    strictness: float = 1.0
     mirrors: bool = True
     fill: Fill | None = None
 
@@ -108,6 +102,8 @@ class ConversionSettings:
                 raise BadSetting(f"{name} must be 1 to {most:,}, not {value:,}.")
         if self.tolerance is not None and not 0 < self.tolerance <= 100:
             raise BadSetting(f"tolerance must be above 0 and at most 100, not {self.tolerance:g}.")
+        if not 0 < self.strictness <= 1:
+            raise BadSetting(f"strictness must be above 0 and at most 1, not {self.strictness:g}.")
         if self.share is not None and not 0 <= self.share <= 1:
             raise BadSetting(f"share must be 0 to 1, not {self.share:g}.")
         if self.strata < 2 or self.strata % 2:
@@ -157,23 +153,19 @@ class ConversionSettings:
     @property
     def tolerated(self) -> float:
         """The tolerance in percent, with None resolved: see `allowed_error`."""
-        return TOLERANCE * self._strictness if self.tolerance is None else self.tolerance
+        return TOLERANCE * self.strictness if self.tolerance is None else self.tolerance
 
     def allowed_error(self, share: float) -> float | None:
         """The tolerance in percent for suns with this share of all light, with None resolved; None
         still where as many lights as asked for are wanted."""
         if self.lights is None and self.tolerance is None:
-            return min(self.tolerated, 100 * OF_OWN_LIGHT * share * self._strictness)
+            return min(self.tolerated, 100 * OF_OWN_LIGHT * share * self.strictness)
         return self.tolerance
 
     @property
     def tightens(self) -> bool:
         """Whether the program allows itself less than usual."""
-        return self.closed and self.lights is None and self.tolerance is None
-
-    @property
-    def _strictness(self) -> float:
-        return IN_CLOSED if self.closed else 1.0
+        return self.strictness < 1 and self.lights is None and self.tolerance is None
 
     def as_dict(self) -> dict[str, object]:
         return asdict(self)

@@ -8,9 +8,10 @@ import pytest
 from mathutils import Matrix
 
 from sunsplit.addon import known
+from sunsplit.addon.fitted import IN_CLOSED
 from sunsplit.addon.restoring import restore_scene
 from sunsplit.addon.scene import convert_scene
-from sunsplit.core.settings import IN_CLOSED, ConversionSettings
+from sunsplit.core.settings import ConversionSettings
 from tests.addon.test_convert import inventory
 from tests.blender import (
     add_mesh,
@@ -216,7 +217,7 @@ def test_lamps_of_a_closed_scene_are_truer_whoever_makes_portals(sunrise):
         known.forget()
         found = convert_scene(scene, ConversionSettings()).conversion
         is_closed = change is not no_roof
-        assert found.settings.closed == is_closed
+        assert (found.settings.strictness < 1) == is_closed
         assert ("In a closed scene" in scene.sunsplit.report) == is_closed
         if is_closed:
             assert found.predicted_error <= IN_CLOSED / 100

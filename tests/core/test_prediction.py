@@ -15,7 +15,6 @@ from sunsplit.core.environment import LUMINANCE_WEIGHTS
 from sunsplit.core.placement import choice
 from sunsplit.core.placement.light_count import fewest
 from sunsplit.core.placement.placement import ON_GROUND, ON_WALLS
-from sunsplit.core.settings import IN_CLOSED
 from tests.benchmarks.occluders import NEVER, Occluders, draw_occluders, light_of, light_of_suns
 from tests.maps import direction, environment, paint_disc, sky
 
@@ -111,13 +110,13 @@ def test_what_level_ground_gets_wrong(sunrise, lights):
 
 
 @pytest.mark.parametrize("share", [0.01, 0.9])
-def test_the_program_allows_itself_less_in_a_closed_scene(share):
-    usual, closed = ConversionSettings(), ConversionSettings(closed=True)
-    assert closed.allowed_error(share) == pytest.approx(IN_CLOSED * usual.allowed_error(share))
-    assert closed.tightens
+def test_the_program_allows_itself_less_where_it_must_be_strict(share):
+    usual, strict = ConversionSettings(), ConversionSettings(strictness=0.3)
+    assert strict.allowed_error(share) == pytest.approx(0.3 * usual.allowed_error(share))
+    assert strict.tightens
     assert not usual.tightens
     for chosen in ({"tolerance": 2.0}, {"lights": 3}, {"lights": 3, "tolerance": 2.0}):
-        asked = ConversionSettings(closed=True, **chosen)
+        asked = ConversionSettings(strictness=0.3, **chosen)
         assert asked.allowed_error(share) == ConversionSettings(**chosen).allowed_error(share)
         assert not asked.tightens
 
