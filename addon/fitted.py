@@ -27,7 +27,7 @@ MADE = 0.9
 
 
 IN_CLOSED = 0.4
-"""Strictness in a closed scene, whose openings' edges stand before all the little light that comes
+"""Leniency in a closed scene, whose openings' edges stand before all the little light that comes
 in. A room under nine maps was up to 15 % wrong with 1, is up to 7 % with this, for a tenth more
 time in the middle (docs/benchmarks/portals.md). With less, suns by the hundred cost more noise than
 they mend, and a sun of a few pixels is cut into many."""
@@ -71,8 +71,7 @@ def fitted_conversion(
     visible = yield from _what_is_visible(reach, environment, settings, light)
     closed = (yield from closed_scene(reach)) if reach else None
     is_dim = closed is not None and closed.part < SMALL
-
-    settings = replace(settings, strictness=IN_CLOSED if is_dim else 1.0)
+    settings = replace(settings, leniency=IN_CLOSED if is_dim else 1.0)
 
     def convert(part: VisiblePart | None) -> Apart:
         return Apart(

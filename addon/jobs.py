@@ -168,7 +168,7 @@ def _work(answer: Future, apart: Apart, listen: Callable, in_main: Callable) -> 
 
 
 def _give_way() -> None:
-    """Let the window go first; only Linux has that for a single thread."""
+    """Let the window go first: on Linux, where this call is about a single thread."""
     if sys.platform == "linux":
         thread = os.PRIO_PROCESS, threading.get_native_id()
         os.setpriority(*thread, max(os.getpriority(*thread), NICENESS))

@@ -191,7 +191,7 @@ def test_a_thread_may_ask_for_steps_in_the_main_thread(scene):
     assert run_at_once(asking()) == "answer"
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has that for a thread")
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nothing is done")
 def test_the_thread_gives_way_to_the_window():
     def niceness(*_):
         with ThreadPoolExecutor(1) as pool:

@@ -217,7 +217,7 @@ def test_lamps_of_a_closed_scene_are_truer_whoever_makes_portals(sunrise):
         known.forget()
         found = convert_scene(scene, ConversionSettings()).conversion
         is_closed = change is not no_roof
-        assert (found.settings.strictness < 1) == is_closed
+        assert (found.settings.leniency < 1) == is_closed
         assert ("In a closed scene" in scene.sunsplit.report) == is_closed
         if is_closed:
             assert found.predicted_error <= IN_CLOSED / 100

@@ -6,7 +6,7 @@ In the window of tests/gui, whose display is drawn by the processor: a redraw of
 slow there, so the gaps are printed beside those of orbiting the view, where Sunsplit has no part,
 and beside the longest time that Sunsplit itself has kept the window.
 A gap is the longest time in which a timer of 20 ms did not run: for so long the window was dead.
-The first lamps that a window draws have Blender make what it draws them with; that gap has no bar.
+The gap of the first conversion in a window has no bar: no Python runs in it, Blender draws.
 """
 
 from __future__ import annotations

@@ -111,12 +111,12 @@ def test_what_level_ground_gets_wrong(sunrise, lights):
 
 @pytest.mark.parametrize("share", [0.01, 0.9])
 def test_the_program_allows_itself_less_where_it_must_be_strict(share):
-    usual, strict = ConversionSettings(), ConversionSettings(strictness=0.3)
+    usual, strict = ConversionSettings(), ConversionSettings(leniency=0.3)
     assert strict.allowed_error(share) == pytest.approx(0.3 * usual.allowed_error(share))
     assert strict.tightens
     assert not usual.tightens
     for chosen in ({"tolerance": 2.0}, {"lights": 3}, {"lights": 3, "tolerance": 2.0}):
-        asked = ConversionSettings(strictness=0.3, **chosen)
+        asked = ConversionSettings(leniency=0.3, **chosen)
         assert asked.allowed_error(share) == ConversionSettings(**chosen).allowed_error(share)
         assert not asked.tightens
 
