@@ -10,12 +10,13 @@ import bpy
 from ..core.conversion import Conversion
 from ..core.environment import EnvironmentMap
 from ..core.openings import Opening
-from ..core.portal_noise import openings_pay
+from ..core.portal_noise import openings_pay, told_at_its_best, untold_at_its_best
 from ..core.sampling import BY_PORTALS, WorldSampling, choose_sampling
 from ..core.settings import ConversionSettings
 from ..core.visible import VisiblePart, through_openings, visible_part
 from .images import READ
 from .known import known_conversion
+from .light_tree import tree_pays
 from .portals import closed_scene, has_portals
 from .rays import Reach
 from .scene_needs import SceneNeeds
@@ -39,9 +40,12 @@ SMALL = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A conversion, and the openings that portals are to stand in for it."""
+    """A conversion, and the openings that portals are to stand in for it. by_tree: whether suns,
+    and the sky through openings, should be chosen by their strength, else by lot, where there are
+    no other lights."""
 
     conversion: Conversion
+    by_tree: bool
     openings: tuple[Opening, ...] = ()
 
     @property
@@ -80,13 +84,23 @@ def fitted_conversion(
 
     # Where the user has made portals, or no light is left for any, there is nothing to decide.
     if closed is None or has_portals(scene) or not settings.leaves_residual:
-        return Fitted((yield convert(visible)))
-    told = Fitted((yield convert(through_openings(visible, closed.part))), closed.openings)
-    untold = Fitted((yield convert(visible)))
-    inside = []
-    for each in (told, untold):
-        inside.append((yield from closed.light(each.conversion, light.map_from_world)))
-    return told if openings_pay(*inside, untold.sampling.method != "NONE") else untold
+        conversion = yield convert(visible)
+        return Fitted(conversion, tree_pays(conversion))
+    told = yield convert(through_openings(visible, closed.part))
+    untold = yield convert(visible)
+    inside = yield from closed.light(told, light.map_from_world)
+    outside = yield from closed.light(untold, light.map_from_world)
+    without = Fitted(untold, tree_pays(untold))
+    has_table = without.sampling.method != "NONE"
+    if not needs.other_lights:
+        inside = told_at_its_best(inside)
+        if without.by_tree:
+            outside = untold_at_its_best(outside, has_table)
+        else:
+            outside = replace(outside, by_tree=False)
+    if openings_pay(inside, outside, has_table):
+        return Fitted(told, inside.by_tree, closed.openings)
+    return replace(without, by_tree=outside.by_tree)
 
 
 def _reach(scene: bpy.types.Scene, needs: SceneNeeds) -> Steps[Reach | None]:

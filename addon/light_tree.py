@@ -49,17 +49,16 @@ def tree_plan(
     conversion: Conversion,
     needs: SceneNeeds,
     found: SceneNeeds,
-    by_portals: bool,
+    pays: bool,
 ) -> TreePlan:
     """What to do with a scene's light tree. needs: what may not be skipped. found: the same as the
-    scene has it, whether or not anything shall be skipped. by_portals: the world is a light to
-    choose, too, and not like the lamps."""
+    scene has it, whether or not anything shall be skipped. pays: whether the tree saves more noise
+    than time, where there are no lights but a conversion's."""
     if not hasattr(scene, "cycles"):
         return TreePlan()
     if not scene.cycles.use_light_tree and not scene.sunsplit.light_tree_off:
         return TreePlan()  # as the user has it
-    others = needs.other_lights or by_portals
-    if not others and not _pays(conversion):
+    if not needs.other_lights and not pays:
         return TreePlan(is_idle=True)
     if not conversion.suns or not overflows(len(conversion.suns) + _other_suns(scene)):
         return TreePlan()
@@ -75,8 +74,8 @@ def tree_plan(
     return TreePlan(guarded=True, warnings=(line,))
 
 
-def _pays(conversion: Conversion) -> bool:
-    """Whether the tree saves more noise than time."""
+def tree_pays(conversion: Conversion) -> bool:
+    """Whether the tree saves more noise than time, where there are no lights but a conversion's."""
     if not conversion.suns:
         return False
     _, residual = parts_of(conversion, by_strength=True)

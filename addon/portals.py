@@ -148,6 +148,7 @@ def _light_inside(
         facing,
         lit,
         float(weighted_sum(solid, lum.sum(axis=1))) / (4 * np.pi),
+        len(suns),
     )
 
 

@@ -145,7 +145,7 @@ def _replace(
     needs = found if options.skips else ALL
     original = state.original_world if _is_converted(scene) else world
     conversion, openings = fitted.conversion, fitted.openings
-    tree = tree_plan(scene, conversion, needs, found, bool(openings))
+    tree = tree_plan(scene, conversion, needs, found, fitted.by_tree)
     sees_it = needs.camera_sees_world
     try:
         new = converted_world(world, light, images, fitted.sampling, fitted.has_cells, sees_it)

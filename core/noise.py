@@ -146,14 +146,29 @@ def borders(lum: Floats, solid: Floats, through: float | None = None) -> Borders
     above = squares[:, 1] - level**2 * squares[:, 0]
     unit = 16 / light**2
     if through is not None:  # light is looked for anyway: suns cost no more time
-        residual = np.pi / 3 * through * (square - above)
-        return Borders(level, unit * square_from_one_place(suns), unit * residual, WORTH)
+        of_suns = unit * square_from_one_place(suns)
+        residual = unit * np.pi / 3 * through * (square - above)
+        to_suns, through_them = _looks(np.maximum(suns[:, 0], 0) * np.sqrt(4 * np.pi) / light)
+        return Borders(level, of_suns / to_suns, residual / through_them, WORTH)
     rest = _all_harmonics(lum * solid[:, None]) - suns
     return Borders(
         level,
         unit * (square_from_one_place(suns) - mean_square_irradiance(suns)),
         unit * (np.pi / 4 * (square - above) - mean_square_irradiance(rest)),
     )
+
+
+def _looks(share: Floats) -> tuple[Floats, Floats]:
+    """Chances that a path tracer looks for suns, and through openings for the rest, where it does
+    one of both: each by its strength, as Cycles' light tree has it. share: of all light that suns
+    have, 0 to 1.
+
+    The rest counts as an even sky, with a quarter of its light; a sun with its irradiance. Averaged
+    over surfaces of all orientations, weighted by what is found.
+    """
+    rest = np.maximum(1 - share, 1e-9)
+    suns = np.maximum(share, 1e-9)
+    return 1 / (1 + 0.375 * rest / suns), 1 / (1 + suns / rest)
 
 
 def _levels(highest: float, lowest: float) -> Floats:

@@ -198,8 +198,10 @@ class Prediction:
         """What level ground in the open gets wrong of the worst channel, as a part of all light."""
         if not len(suns) or np.isnan(self.ground).all():
             return 0.0
-        seen = [disc_on_ground(float(sun.to_light[2]), sun.angular_diameter / 2) for sun in suns]
-        given = _parts(np.array([sun.scalar_irradiance for sun in suns]), np.array(seen))
+        height = np.array([sun.to_light[2] for sun in suns])
+        half = np.array([sun.angular_diameter for sun in suns]) / 2
+        seen = disc_on_ground(height, half)
+        given = _parts(np.array([sun.scalar_irradiance for sun in suns]), seen)
         return float(self.part * np.nanmax(np.abs(given - self.ground)))
 
     def wrong_on_walls(self, suns: Sequence[Sun]) -> float | None:
@@ -227,22 +229,17 @@ def _pieces(suns: Sequence[Sun], lit: Sequence[float]) -> tuple[Floats, Floats, 
     """Suns, one at least, as points in a spiral over the disc of each: directions, luminous light
     and half widths. lit: how much of each sun's light."""
     to_light = np.array([sun.to_light for sun in suns])
-    axes = np.stack([*sphere.tangents(to_light), to_light], axis=1)
+    diameter = np.array([sun.angular_diameter for sun in suns])
     light = np.array([sun.scalar_irradiance for sun in suns]) @ LUMINANCE_WEIGHTS * lit
-    weight = light * np.sqrt([sun.angular_diameter for sun in suns])
+    weight = light * np.sqrt(diameter)
     parts = PIECES * weight / max(weight.sum(), 1e-300)
     counts = np.maximum(np.round(parts).astype(int), FEWEST)
-    found = []
-    for sun, whole, count, its_axes in zip(suns, light, counts, axes, strict=True):
-        if sun.angular_diameter == 0:
-            found.append((sun.to_light[None], np.array([whole]), np.array([SHARP])))
-            continue
-        cap = 2 * np.sin(sun.angular_diameter / 4) ** 2  # 1 - cos of the half-angle
-        directions = sphere.spiral(cap, count) @ its_axes
-        half = np.sqrt(2 * np.pi * cap / count) / 2
-        found.append((directions, np.full(count, whole / count), np.full(count, half)))
-    directions, given, half_width = (np.concatenate(arrays) for arrays in zip(*found, strict=True))
-    return directions, given, half_width
+    counts[diameter == 0] = 1
+    cap = 2 * np.sin(diameter / 4) ** 2  # 1 - cos of the half-angle
+    half = np.sqrt(2 * np.pi * cap / counts) / 2
+    half[diameter == 0] = SHARP
+    sun = np.repeat(np.arange(len(suns)), counts)
+    return sphere.spirals(to_light, cap, counts), (light / counts)[sun], half[sun]
 
 
 def _around(targets: Floats, angles: Floats, turns: Floats) -> Floats:

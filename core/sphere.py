@@ -9,6 +9,8 @@ row touches a pole.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -167,16 +169,30 @@ def circle(to_centre: Floats, angular_radius: float, count: int = 361) -> Floats
     return np.cos(angular_radius) * to_centre + np.sin(angular_radius) * rim
 
 
-def spiral(cap: Floats | float, count: int) -> Floats:
-    """Points spread evenly over caps around +Z, (..., count, 3): of the same part of it each.
+def spirals(centres: Floats, caps: Floats, counts: NDArray[np.intp]) -> Floats:
+    """Points spread evenly over caps, each of the same part of its cap: first those of the first
+    cap, (counts.sum(), 3).
 
-    cap: 1 - cos of the half-angle of each, (...).
+    centres: unit vectors, (n, 3). caps: 1 - cos of the half-angle of each, (n,). counts: so many
+    points each, one at least, (n,).
     """
-    part = (np.arange(count) + 0.5) / count
-    turn = np.arange(count) * (np.pi * (3 - np.sqrt(5)))
-    along = 1 - np.asarray(cap)[..., None] * part
+    cap = np.repeat(np.arange(len(caps)), counts)
+    number = np.arange(len(cap)) - (np.cumsum(counts) - counts)[cap]
+    along = 1 - caps[cap] * ((number + 0.5) / counts[cap])
     aside = np.sqrt(np.maximum(1 - along**2, 0))
-    return np.stack([aside * np.cos(turn), aside * np.sin(turn), along], axis=-1)
+    turns = _golden_turns(int(counts.max()))
+    first, second = tangents(centres)
+    points = along[:, None] * centres[cap]
+    points += (aside * turns[0].take(number))[:, None] * first[cap]
+    points += (aside * turns[1].take(number))[:, None] * second[cap]
+    return points
+
+
+@lru_cache(maxsize=8)
+def _golden_turns(count: int) -> Floats:
+    """Cosines and sines of 0, 1, ... times the golden angle, (2, count)."""
+    turn = np.arange(count) * (np.pi * (3 - np.sqrt(5)))
+    return np.stack([np.cos(turn), np.sin(turn)])
 
 
 def tangents(directions: Floats) -> tuple[Floats, Floats]:

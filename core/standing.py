@@ -40,8 +40,7 @@ def discs_on_walls(to_light: Floats, half_angle: Floats) -> Floats:
     Each is a spiral of pieces.
     """
     cap = 2 * np.sin(half_angle / 2) ** 2  # 1 - cos
-    axes = np.stack([*sphere.tangents(to_light), to_light], axis=1)
-    places = sphere.spiral(cap, PIECES) @ axes
+    places = sphere.spirals(to_light, cap, np.full(len(cap), PIECES))
     half = np.repeat(np.sqrt(2 * np.pi * cap / PIECES) / 2, PIECES)
-    found = on_walls(places.reshape(-1, 3), half)
+    found = on_walls(places, half)
     return found.reshape(len(to_light), PIECES, WALLS).mean(axis=1)

@@ -50,10 +50,9 @@ class Cuts:
         """How many cells there are by now."""
         return len(self._parents)
 
-    @property
-    def wrong(self) -> Floats:
-        """Sums of what is measured of 1, 2, ... cells, (count, JUDGED)."""
-        return np.stack(self._wrong)
+    def wrong(self, counts: Owner) -> Floats:
+        """Sums of what is measured of so many cells, (n,), at most `count` each: (n, JUDGED)."""
+        return np.stack([self._wrong[number - 1] for number in counts])
 
     def grow(self, count: int, allowed: float = -1.0) -> None:
         """Cut until there are `count` cells or a few more, or nothing can be cut, or only `allowed`

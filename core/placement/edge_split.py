@@ -141,7 +141,7 @@ class EdgeSplit:
     def error_of_cuts(self, count: int) -> float:
         """About what so many cells get wrong: before they are balanced; see `PatchCells.error`."""
         self._truest.grow(count)
-        return error_of(self._truest.wrong[:count][-1])
+        return error_of(self._truest.wrong(np.array([min(count, self._truest.count)]))[0])
 
     def _enough(self, count: int, allowed: float) -> int:
         """With how many cells, before they are balanced, least is wrong, or little enough."""
@@ -149,7 +149,7 @@ class EdgeSplit:
         last = min(count, self._truest.count)
         # Where only some of the worst are cut, the rest of them would be next.
         numbers = np.array([*(end for end in self._truest.ends if end < last), last])
-        wrong = self._truest.wrong[numbers - 1]
+        wrong = self._truest.wrong(numbers)
         within = np.sqrt(wrong.max(axis=1)) <= allowed
         if within.any():
             wrong = wrong[: np.argmax(within) + 1]

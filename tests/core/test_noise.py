@@ -69,6 +69,41 @@ def test_a_border_is_of_the_map_and_not_of_its_unit(seed, spread, exponent):
     assert found.variance.min() >= OTHERWISE - 0.02
 
 
+def test_through_openings_a_path_tracer_looks_for_one_of_both_by_its_strength():
+    """A sun and an even sky: the chance of each at surfaces of all orientations, by their sums."""
+    lum, solid = np.ones(SIZE[::-1]), sphere.row_solid_angles(*SIZE)
+    lum[10, 20] = 2000.0
+    part = 0.015
+    found = borders(lum, solid, part)
+    normals = everywhere()[1] / (4 * np.pi)
+    facing = np.maximum(
+        everywhere()[0] @ sphere.pixel_directions(np.array([10 * 64 + 20]), *SIZE).T, 0
+    )
+    facing = facing[:, 0]
+    whole = float(solid @ lum.sum(axis=1))
+    k = int(np.argmax(found.level < 500))
+    level = found.level[k]
+    sun = (2000.0 - level) * solid[10]
+    rest = whole - sun
+    to_sun = sun * facing / (sun * facing + rest / 4)
+    unit = 16 / whole**2
+    lit = facing > 0
+    of_sun = unit * ((sun * facing[lit]) ** 2 / to_sun[lit]) @ normals[lit]
+    squares = float(solid @ (np.minimum(lum, level) ** 2).sum(axis=1))
+    of_sky = unit * np.pi / 3 * part * squares * (1 / (1 - to_sun)) @ normals
+    assert found.suns[k] == pytest.approx(of_sun, rel=0.02)
+    assert found.residual[k] == pytest.approx(of_sky, rel=0.02)
+
+
+def test_through_openings_a_little_of_the_light_is_not_worth_a_sun():
+    """Looked for so seldom it would be noisier than the sky that it stands in."""
+    lum, solid = np.ones(SIZE[::-1]), sphere.row_solid_angles(*SIZE)
+    lum[10, 20:24] = 8.0
+    assert borders(lum, solid, 0.015).best == 0
+    lum[10, 20:24] = 800.0
+    assert borders(lum, solid, 0.015).best > 0
+
+
 def test_nothing_is_worth_a_sun_in_an_even_sky():
     lum, solid = random_map(0, 0.1)
     assert borders(lum, solid).best_level == lum.max()

@@ -16,6 +16,8 @@ from sunsplit.core.portal_noise import (
     mean_square_told,
     mean_square_untold,
     openings_pay,
+    told_at_its_best,
+    untold_at_its_best,
 )
 
 SIZE = np.array([4.0, 6.0, 3.0])
@@ -214,7 +216,9 @@ def light(sky, suns, lit=0.02, out=0.02):
     facing = np.full((places, 1), suns)
     given = np.where(np.arange(places) < lit * places, suns, 0.0)[:, None]
     escaped = np.full(int(out * looks), sky)
-    return LightInside(escaped, np.full(len(escaped), 0.5), looks, facing, given, sky)
+    return LightInside(
+        escaped, np.full(len(escaped), 0.5), looks, facing, given, sky, facing.shape[1]
+    )
 
 
 def pays(inside):
@@ -229,6 +233,25 @@ def test_openings_pay_where_the_sky_gives_the_light():
 def test_openings_do_not_pay_where_the_suns_give_it_or_rays_find_the_sky():
     assert not pays(light(sky=0.05, suns=10.0))
     assert not pays(light(sky=1.0, suns=0.0, out=0.9))
+
+
+def test_what_is_seldom_lit_but_strong_outside_is_drawn_by_lot_inside():
+    """By its strength a sun that no place sees is drawn nearly always, and the sky hardly ever."""
+    dazzling = light(sky=1.0, suns=100.0, lit=0.0)
+    assert not told_at_its_best(dazzling).by_tree
+    by_lot = replace(dazzling, by_tree=False)
+    assert mean_square_told(by_lot) < 0.1 * mean_square_told(dazzling)
+    of_use = light(sky=0.01, suns=100.0, lit=0.5)
+    assert told_at_its_best(of_use).by_tree
+
+
+def test_suns_of_which_few_give_the_light_are_drawn_by_strength():
+    few = np.array([100.0, 1.0, 1.0, 1.0])
+    alike = np.full(4, 25.0)
+    for strengths, by_tree in ((few, True), (alike, False)):
+        facing = np.tile(strengths, (100, 1))
+        inside = LightInside(np.array([0.1]), np.array([0.5]), 1000, facing, facing, 0.1, 4)
+        assert untold_at_its_best(inside, has_table=False).by_tree == by_tree
 
 
 def test_of_the_sky_alone_rays_find_its_square_by_how_rarely_they_get_out():
