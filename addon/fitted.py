@@ -10,7 +10,7 @@ import bpy
 from ..core.conversion import Conversion
 from ..core.environment import EnvironmentMap
 from ..core.openings import Opening
-from ..core.portal_noise import openings_pay, told_at_its_best, untold_at_its_best
+from ..core.portal_noise import LightInside, openings_pay, told_at_its_best, untold_at_its_best
 from ..core.sampling import BY_PORTALS, WorldSampling, choose_sampling
 from ..core.settings import ConversionSettings
 from ..core.visible import VisiblePart, through_openings, visible_part
@@ -29,8 +29,8 @@ MADE = 0.9
 
 IN_CLOSED = 0.4
 """Leniency in a closed scene, whose openings' edges stand before all the little light that comes
-in. A room under nine maps was up to 15 % wrong with 1, is up to 7 % with this, for a tenth more
-time in the middle (docs/benchmarks/portals.md). With less, suns by the hundred cost more noise than
+in. A room under nine maps was up to 15 % wrong with 1, is up to 2.4 % with this
+(docs/benchmarks/portals.md). With less, suns by the hundred cost more noise than
 they mend, and a sun of a few pixels is cut into many."""
 
 SMALL = 0.1
@@ -90,17 +90,23 @@ def fitted_conversion(
     untold = yield convert(visible)
     inside = yield from closed.light(told, light.map_from_world)
     outside = yield from closed.light(untold, light.map_from_world)
-    without = Fitted(untold, tree_pays(untold))
-    has_table = without.sampling.method != "NONE"
-    if not needs.other_lights:
+    by_portals = Fitted(told, by_tree=True, openings=closed.openings)
+    return _calmer(by_portals, inside, Fitted(untold, tree_pays(untold)), outside, needs)
+
+
+def _calmer(
+    told: Fitted, inside: LightInside, untold: Fitted, outside: LightInside, needs: SceneNeeds
+) -> Fitted:
+    """Of a conversion for portals and one without, each with what it gives a closed scene."""
+    has_table = untold.sampling.method != "NONE"
+    if not needs.other_lights:  # else the tree stays
         inside = told_at_its_best(inside)
-        if without.by_tree:
+        outside = replace(outside, by_tree=untold.by_tree)
+        if untold.by_tree:
             outside = untold_at_its_best(outside, has_table)
-        else:
-            outside = replace(outside, by_tree=False)
     if openings_pay(inside, outside, has_table):
-        return Fitted(told, inside.by_tree, closed.openings)
-    return replace(without, by_tree=outside.by_tree)
+        return replace(told, by_tree=inside.by_tree)
+    return replace(untold, by_tree=outside.by_tree)
 
 
 def _reach(scene: bpy.types.Scene, needs: SceneNeeds) -> Steps[Reach | None]:

@@ -121,7 +121,7 @@ def skipped_sentences(
             )
         )
     if tree_off:
-        lines.append(said("Skipped: the light tree, as the lamps are cheaper without and alone."))
+        lines.append(said("Skipped: the light tree, as it would take longer than it saves."))
     return lines
 
 

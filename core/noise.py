@@ -10,7 +10,8 @@ one sample of each has, in squares of the mean irradiance, the mean variance
 In a closed scene whose openings the path tracer knows it looks for the residual through these. If
 they take a part f of the half sphere above a place, of which 2 pi f is the solid angle, that leaves
 pi f / 3 instead of pi/4; what is seen of suns and of the residual is as rare, so that the mean
-squares K do not count.
+squares K do not count. There it looks for one of both at a time, which makes either as much noisier
+as it is seldom looked for: a little light in suns is noisier than left where it is.
 
 Renders are less noisy than that, but least noisy for about the same border
 (docs/benchmarks/region_a.md).

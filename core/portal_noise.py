@@ -3,7 +3,8 @@
 From each surface it looks for light once: towards a sun, or, told of openings, sometimes through
 one of those instead. Else it meets the sky only where its own next ray happens to get out. Told, it
 looks less often for the suns. Which of both is less noisy depends on how much of the light inside
-is the sky's, how rarely rays get out, and how much of the scene the suns reach.
+is the sky's, how rarely rays get out, and how much of the scene the suns reach; and so does whether
+it should choose by strength, with a light tree, or by lot.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from .sampling import TIME_BY_LOT, TIME_BY_TREE
 
 Floats = NDArray[np.float64]
 
-COST, COST_BY_LOT = 1.3, 1.15
+COST, COST_BY_LOT = 1.3, 1.05
 """Of a sample that looks for suns and for the sky, against one that only looks for as many suns,
 with a light tree and by lot; these and the next by docs/benchmarks/portals.md."""
 
