@@ -208,6 +208,37 @@ def test_a_sun_through_the_window_that_gives_nearly_all_light_needs_none(tmp_pat
     assert not portals(scene)
 
 
+@pytest.fixture
+def even(tmp_path):
+    """A sky with brighter clouds before the window, and nothing that is worth a lamp."""
+    pixels = sky(256, 1.0)
+    for turn in (-10, 10):
+        paint_disc(pixels, direction(turn, 20), 6, (4, 4, 4))
+    return room(write_map(tmp_path / "even.exr", pixels))
+
+
+def test_through_a_portal_a_little_brighter_sky_gets_no_lamp_and_no_light_tree(even):
+    even.cycles.use_light_tree = True
+    bpy.ops.sunsplit.convert()
+    assert len(portals(even)) == 1
+    assert not suns(even)
+    assert not even.cycles.use_light_tree
+    assert "Skipped: the light tree" in even.sunsplit.report
+    restore_scene(even)
+    assert even.cycles.use_light_tree
+
+
+def test_the_light_tree_stays_in_a_room_with_lamps_of_its_own(even):
+    bulb = bpy.data.objects.new("Bulb", bpy.data.lights.new("Bulb", "POINT"))
+    bulb.location = 0, 0, 2
+    even.collection.objects.link(bulb)
+    bpy.context.view_layer.update()
+    even.cycles.use_light_tree = True
+    bpy.ops.sunsplit.convert()
+    assert len(portals(even)) == 1
+    assert even.cycles.use_light_tree
+
+
 def test_lamps_of_a_closed_scene_are_truer_whoever_makes_portals(sunrise):
     for change in (no_roof, None, users_portal):
         scene = room(sunrise)
