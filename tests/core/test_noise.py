@@ -98,9 +98,9 @@ def test_through_openings_a_path_tracer_looks_for_one_of_both_by_its_strength():
 def test_through_openings_a_little_of_the_light_is_not_worth_a_sun():
     """Looked for so seldom it would be noisier than the sky that it stands in."""
     lum, solid = np.ones(SIZE[::-1]), sphere.row_solid_angles(*SIZE)
-    lum[10, 20:24] = 8.0
+    lum[10, 20:24] = 30.0
     assert borders(lum, solid, 0.015).best == 0
-    lum[10, 20:24] = 800.0
+    lum[10, 20:24] = 400.0
     assert borders(lum, solid, 0.015).best > 0
 
 
