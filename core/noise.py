@@ -167,8 +167,7 @@ def _looks(share: Floats) -> tuple[Floats, Floats]:
     The rest counts as an even sky, with a quarter of its light; a sun with its irradiance. Averaged
     over surfaces of all orientations, weighted by what is found.
     """
-    rest = np.maximum(1 - share, 1e-9)
-    suns = np.maximum(share, 1e-9)
+    rest, suns = np.maximum([1 - share, share], 1e-9)  # what is not there is not divided by
     return 1 / (1 + 0.375 * rest / suns), 1 / (1 + suns / rest)
 
 

@@ -75,8 +75,8 @@ def _ways(light: LightInside) -> list[LightInside]:
 
 
 def _time(light: LightInside, for_sky: bool) -> float:
-    """Of a sample, against one that looks for one sun only. for_sky: whether it looks for that
-    too."""
+    """Of a sample, against one that has no suns to choose among. for_sky: whether it looks for the
+    sky too."""
     each = TIME_BY_TREE if light.by_tree else TIME_BY_LOT
     whole = COST if light.by_tree else COST_BY_LOT
     return (whole if for_sky else 1.0) * (1 + each * light.number)
@@ -91,9 +91,10 @@ def mean_square_untold(light: LightInside, has_table: bool) -> float:
 def mean_square_told(light: LightInside) -> float:
     """The same where it is looked for through openings."""
     sky = 2 * np.pi / light.looks * float(light.sky @ light.cosines)
-    strength = light.facing.sum(axis=1).mean() + np.pi * light.average
-    part = np.pi * light.average / strength if strength else 1.0
-    if not light.by_tree:
+    if light.by_tree:
+        strength = light.facing.sum(axis=1).mean() + np.pi * light.average
+        part = np.pi * light.average / strength if strength else 1.0
+    else:
         part = 1 / (light.number + 1)
     through = THROUGH * sky**2 / part if part else 0.0
     return through + _of_suns(light, np.pi * light.average)
