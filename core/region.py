@@ -92,7 +92,7 @@ def light_of_region_a(environment: EnvironmentMap, strata: Strata, fill: Fill) -
     width, height = environment.width, environment.height
     region = strata.region_a
     if fill == "surroundings":
-        region = sphere.grow_groups(region.astype(np.int32), strata.luminance) > 0
+        region = sphere.grown(region)
     pixels = np.flatnonzero(region)
     # In float64 from the float32 that will be stored: the account then closes by itself.
     before = environment.radiance.reshape(-1, 3)[pixels].astype(np.float64)

@@ -123,17 +123,32 @@ def neighbours(
 
     indices: (n,). Returns (n, 4) or (n, 8). Over a pole lies the pixel half a turn away.
     """
-    rows, columns = np.divmod(indices, width)
     steps = [(0, -1), (0, 1), (-1, 0), (1, 0)]
     if corners:
         steps += [(-1, -1), (-1, 1), (1, -1), (1, 1)]
-    found = []
-    for down, right in steps:
+    found = np.add.outer(indices, [down * width + right for down, right in steps])
+    columns = indices % width
+    ends = (columns == 0) | (columns == width - 1)
+    ends |= (indices < width) | (indices >= (height - 1) * width)
+    at = np.flatnonzero(ends)
+    rows, columns = np.divmod(indices[at], width)
+    for number, (down, right) in enumerate(steps):
         row = rows + down
         over = (row < 0) | (row >= height)
         column = (columns + right + np.where(over, width // 2, 0)) % width
-        found.append(np.clip(row, 0, height - 1) * width + column)
-    return np.stack(found, axis=-1)
+        found[at, number] = np.clip(row, 0, height - 1) * width + column
+    return found
+
+
+def grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Larger by one pixel on all sides, corners included, over seam and poles: (height, width)."""
+    wide = mask | np.roll(mask, 1, axis=1) | np.roll(mask, -1, axis=1)
+    tall = wide.copy()
+    tall[1:] |= wide[:-1]
+    tall[:-1] |= wide[1:]
+    for row in (0, -1):
+        tall[row] |= np.roll(wide[row], mask.shape[1] // 2)
+    return tall
 
 
 def grow_groups(labels: NDArray[np.int32], brightness: Floats) -> NDArray[np.int32]:

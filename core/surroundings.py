@@ -25,19 +25,23 @@ def surroundings(radiance: NDArray[np.float32], region: NDArray[np.bool_]) -> ND
     labels, count = sphere.connected_groups(region)
     pixels = np.flatnonzero(region)
     owner = labels.ravel()[pixels] - 1
-    near = sphere.neighbours(pixels, width, height)
-    outside = ~region.ravel()[near]
     size = np.bincount(owner, minlength=count)
-    rimmed = np.bincount(owner, outside.any(axis=1), count) > 0
     result = np.zeros((len(pixels), 3))
-    for group in np.flatnonzero(rimmed & (size > LARGE)):
+    for group in np.flatnonzero(size > LARGE):
         mine = owner == group
-        rim = flat[near[mine][outside[mine]]]
-        result[mine] = rim.mean(axis=0, dtype=np.float64)
-    smooth = (rimmed & (size <= LARGE))[owner]
+        near = sphere.neighbours(pixels[mine], width, height)
+        rim = near[~region.ravel()[near]]
+        if len(rim):
+            result[mine] = flat[rim].mean(axis=0, dtype=np.float64)
+    small = np.flatnonzero((size <= LARGE)[owner])
+    near = sphere.neighbours(pixels[small], width, height)
+    outside = ~region.ravel()[near]
+    rimmed = np.bincount(owner[small], outside.any(axis=1), count) > 0
+    smooth = rimmed[owner[small]]
     if smooth.any():
         # All groups at once: what does not touch does not matter to each other.
-        result[smooth] = _harmonic(flat, pixels[smooth], near[smooth], outside[smooth])
+        some = pixels[small[smooth]]
+        result[small[smooth]] = _harmonic(flat, some, near[smooth], outside[smooth])
     return np.minimum(result.astype(np.float32), flat[pixels])
 
 
@@ -52,14 +56,16 @@ def _harmonic(
     from scipy.sparse.linalg import splu
 
     count = len(pixels)
-    own = np.arange(count)
-    row, side = np.nonzero(~outside)
-    column = np.searchsorted(pixels, near[row, side])
-    values = np.concatenate([np.full(count, 4.0), np.full(len(row), -1.0)])
-    places = np.concatenate([own, row]), np.concatenate([own, column])
-    matrix = csc_array((values, places), shape=(count, count))
+    own = np.arange(count)[:, None]
+    # The matrix is symmetric: what each row holds is what the column of that number holds.
+    beside = np.where(outside, count, np.searchsorted(pixels, near))
+    places = np.sort(np.concatenate([own, beside], axis=1), axis=1).astype(np.int32)
+    held = places < count
+    ends = np.concatenate([[0], np.cumsum(held.sum(axis=1))]).astype(np.int32)
+    values = np.where(places == own, 4.0, -1.0)[held]
+    matrix = csc_array((values, places[held], ends), shape=(count, count))
     given = np.where(outside[..., None], flat[near], 0).sum(axis=1, dtype=np.float64)
-    # The matrix is symmetric and needs no pivots: so ordered, it takes less. Its columns have
-    # little in common: one at a time takes half of what panels of many take.
+    # And it needs no pivots: so ordered, it takes less. Its columns have little in common: one at a
+    # time takes half of what panels of many take.
     order = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}, "panel_size": 1}
     return np.maximum(splu(matrix, diag_pivot_thresh=0.0, **order).solve(given), 0)

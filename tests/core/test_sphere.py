@@ -103,3 +103,29 @@ def test_a_circle_lies_at_its_radius():
     centre = direction(77, 88.5)
     rim = sphere.circle(centre, np.radians(3.0))
     assert sphere.angle_between(rim, centre) == pytest.approx(np.radians(3.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("corners", [False, True])
+@pytest.mark.parametrize("width", [2, 4, 16])
+def test_neighbours_go_over_seam_and_poles(width, corners):
+    height = width // 2
+    steps = [(0, -1), (0, 1), (-1, 0), (1, 0)]
+    if corners:
+        steps += [(-1, -1), (-1, 1), (1, -1), (1, 1)]
+    found = sphere.neighbours(np.arange(width * height), width, height, corners)
+    for pixel, others in enumerate(found):
+        row, column = divmod(pixel, width)
+        for (down, right), other in zip(steps, others, strict=True):
+            over = not 0 <= row + down < height
+            there = row if over else row + down
+            beside = (column + right + (width // 2 if over else 0)) % width
+            assert other == there * width + beside
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([2, 8, 32]))
+def test_grown_by_one_pixel_on_all_sides(seed, width):
+    mask = np.random.default_rng(seed).random((width // 2, width)) < 0.1
+    expected = mask.copy()
+    around = sphere.neighbours(np.flatnonzero(mask), width, width // 2, corners=True)
+    expected.ravel()[around] = True
+    assert (sphere.grown(mask) == expected).all()
