@@ -41,9 +41,10 @@ PIECES, FEWEST = 2048, 16
 its width each disc gets its part: so shared out they tell the same errors as twice as many do, the
 same number for each."""
 
-AT_ONCE = 64
-"""Pieces of light that are held against all surfaces at a time: few enough for a processor's own
-memory, where the same sums take a third of the time."""
+AT_ONCE = 128
+"""Pieces of light that are held against all surfaces at a time, with single precision: few enough
+for a processor's own memory. Sums of so many are right to 3e-7 of what they come to, where
+predictions are good to a tenth, and take half the time; these are added up as doubles."""
 
 SHARP = 1e-7
 """Half the width of a point, radians."""
@@ -67,13 +68,14 @@ class Surfaces:
         width = 2 * half_width[:, None]
         one = np.ones_like(width)
         # How far outside of the cone, in widths of the piece: at most half of one decides.
-        pieces = np.concatenate([directions / width, 1 / width, one], axis=1)
+        pieces = _single(np.concatenate([directions / width, 1 / width, one], axis=1))
         sine, cosine = np.sin(self.radii), np.cos(self.radii)
         half = np.full_like(sine, 0.5)
-        cones = np.concatenate([-self.axes.T / sine, [cosine / sine], [half]])
-        light, normals = directions * flux[:, None], self.normals.T
+        cones = _single(np.concatenate([-self.axes.T / sine, [cosine / sine], [half]]))
+        whole = max(float(flux.sum()), 1e-300)
+        light, normals = _single(directions * (flux / whole)[:, None]), _single(self.normals.T)
         total = np.zeros(len(self.radii))
-        space = np.empty((2, min(AT_ONCE, len(directions)), len(total)))
+        space = np.empty((2, min(AT_ONCE, len(directions)), len(total)), np.float32)
         for start in range(0, len(directions), AT_ONCE):
             some = slice(start, start + AT_ONCE)
             seen, given = space[:, : len(pieces[some])]
@@ -81,7 +83,7 @@ class Surfaces:
             np.maximum(np.matmul(light[some], normals, out=given), 0, out=given)
             seen *= given
             total += seen.sum(axis=0)
-        return total
+        return total * whole
 
     def of(self, patches: Patches) -> Floats:
         """Of each surface, luminance, (s,)."""
@@ -240,6 +242,10 @@ def _pieces(suns: Sequence[Sun], lit: Sequence[float]) -> tuple[Floats, Floats, 
     half[diameter == 0] = SHARP
     sun = np.repeat(np.arange(len(suns)), counts)
     return sphere.spirals(to_light, cap, counts), (light / counts)[sun], half[sun]
+
+
+def _single(values: Floats) -> NDArray[np.float32]:
+    return values.astype(np.float32)
 
 
 def _around(targets: Floats, angles: Floats, turns: Floats) -> Floats:

@@ -9,7 +9,7 @@ import pytest
 
 from sunsplit.core import ConversionSettings, convert, load
 from sunsplit.core.environment import LUMINANCE_WEIGHTS
-from sunsplit.core.placement.level import levelled
+from sunsplit.core.placement.level import Level, levelled
 from sunsplit.core.standing import NORMALS, WALLS, discs_on_walls
 from sunsplit.core.suns import disc_on_ground, disc_sun
 from tests.benchmarks.occluders import NEVER, Occluders, light_of, light_of_suns
@@ -49,10 +49,12 @@ def test_tilted_discs_give_walls_and_ground_what_they_should():
 
     wanted = part @ discs_on_walls(to_light, half) * 1.03
     up = part @ disc_on_ground(to_light[:, 2], half)
-    before, after = wrong(suns), wrong(levelled(suns, np.full(3, up), wanted))
+    level = Level(np.full(3, up), wanted, on_ground=5e-4, on_walls=5e-4, shadows=1.0)
+    before, after = wrong(suns), wrong(levelled(suns, level, 0.0, costs=0.65))
     print(before, after)
-    assert after[0] < before[0] / 3
-    assert after[1] < 2e-3
+    assert before[0] > 4 * level.on_walls
+    assert after[0] <= level.on_walls
+    assert after[1] <= level.on_ground
 
 
 @pytest.mark.parametrize("share", [None, 0.9])
