@@ -29,13 +29,18 @@ MADE = 0.9
 
 IN_CLOSED = 0.4
 """Leniency in a closed scene, whose openings' edges stand before all the little light that comes
-in. A room under nine maps was up to 15 % wrong with 1, is up to 2.4 % with this
-(docs/benchmarks/portals.md). With less, suns by the hundred cost more noise than
-they mend, and a sun of a few pixels is cut into many."""
+in."""
+
+STRICT, FEW = 0.2, 16
+"""Leniency where Cycles is told of the openings, unless that takes more suns. With IN_CLOSED rooms
+under nine maps stay wrong by up to 2.4 % RMS, with this by up to 1.1 %; but the 26 suns that one
+map would take made more noise than that is worth."""
 
 SMALL = 0.1
-"""Of the half sphere above a place, openings that leave most of the light outside. A window takes
-.015 of it in the room of docs/benchmarks/portals.md."""
+"""Of the half sphere above a place, what openings take at most: through larger ones rays find the
+sky by themselves. A window takes .015 of it in the room of docs/benchmarks/portals.md; a missing
+roof takes .23, and portals in it gained nothing under six maps, but up to twice the noise.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,19 +79,24 @@ def fitted_conversion(
     reach = yield from _reach(scene, needs)
     visible = yield from _what_is_visible(reach, environment, settings, light)
     closed = (yield from closed_scene(reach)) if reach else None
-    is_dim = closed is not None and closed.part < SMALL
-    settings = replace(settings, leniency=IN_CLOSED if is_dim else 1.0)
+    if closed is not None and closed.part >= SMALL:
+        closed = None
+    usual = 1.0 if closed is None else IN_CLOSED
 
-    def convert(part: VisiblePart | None) -> Apart:
+    def convert(part: VisiblePart | None, leniency: float = usual) -> Apart:
+        chosen = replace(settings, leniency=leniency)
         return Apart(
-            lambda listen, _: known_conversion(environment, settings, part, listen), READ, MADE
+            lambda listen, _: known_conversion(environment, chosen, part, listen), READ, MADE
         )
 
     # Where the user has made portals, or no light is left for any, there is nothing to decide.
     if closed is None or has_portals(scene) or not settings.leaves_residual:
         conversion = yield convert(visible)
         return Fitted(conversion, tree_pays(conversion))
-    told = yield convert(through_openings(visible, closed.part))
+    through = through_openings(visible, closed.part)
+    told = yield convert(through, STRICT)
+    if told.settings.tightens and len(told.suns) > FEW:
+        told = yield convert(through)
     untold = yield convert(visible)
     inside = yield from closed.light(told, light.map_from_world)
     outside = yield from closed.light(untold, light.map_from_world)

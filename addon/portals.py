@@ -15,7 +15,7 @@ from ..core import sphere
 from ..core.conversion import Conversion
 from ..core.environment import LUMINANCE_WEIGHTS, luminance
 from ..core.openings import WIDEST, Inside, Opening, find_openings, may_be_closed, part_seen
-from ..core.portal_noise import LightInside
+from ..core.portal_noise import LightInside, square_through
 from ..core.sums import weighted_sum
 from .images import READ
 from .lamps import remove_lamps, unlink_lamps
@@ -59,7 +59,7 @@ class ClosedScene:
 
     def light(self, conversion: Conversion, to_map: NDArray[np.float64]) -> Steps[LightInside]:
         """Of a conversion with a residual. to_map: rotation (3, 3) from the scene's axes."""
-        return _light_inside(self.reach, self.inside, conversion, to_map)
+        return _light_inside(self, conversion, to_map)
 
 
 def closed_scene(reach: Reach) -> Steps[ClosedScene | None]:
@@ -121,9 +121,9 @@ def _points(vectors: Iterable[Vector]) -> NDArray[np.float64]:
 
 
 def _light_inside(
-    reach: Reach, inside: Inside, conversion: Conversion, to_map: NDArray[np.float64]
+    closed: ClosedScene, conversion: Conversion, to_map: NDArray[np.float64]
 ) -> Steps[LightInside]:
-    radiance = conversion.residual
+    reach, inside, radiance = closed.reach, closed.inside, conversion.residual
     height, width = radiance.shape[:2]
     lum = luminance(radiance)
     solid = sphere.row_solid_angles(width, height)
@@ -141,10 +141,15 @@ def _light_inside(
                 lit[row, k] = facing[row, k]
             if row % AT_A_TIME == 0:
                 yield
+
+    def sky(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+        return lum.ravel()[sphere.pixels_at(directions @ to_map.T, width, height)]
+
     return LightInside(
-        lum.ravel()[sphere.pixels_at(inside.escaped @ to_map.T, width, height)],
+        sky(inside.escaped),
         (normals[inside.started] * inside.escaped).sum(axis=1),
         LOOKS * len(normals),
+        square_through(closed.openings, inside.places, normals, sky),
         facing,
         lit,
         float(weighted_sum(solid, lum.sum(axis=1))) / (4 * np.pi),

@@ -117,6 +117,13 @@ class Opening:
         """Whether points (n, 3) are inside, seen from here."""
         return (points - self.centre) @ self.inwards > 0
 
+    def points(self, side: int) -> tuple[Floats, float]:
+        """Evenly over the rectangle, (side * side, 3), and the area that each stands for."""
+        part = (np.arange(side) + 0.5) / side - 0.5
+        across = part[:, None, None] * (self.width * self.across)
+        points = self.centre + across + part[:, None] * (self.height * self.up)
+        return points.reshape(-1, 3), self.width * self.height / side**2
+
     def is_crossed(self, starts: Floats, directions: Floats) -> NDArray[np.bool_]:
         """Whether rays (n, 3) go out through here."""
         along, out = _crossings(self.inwards, self.inwards @ self.centre, starts, directions)

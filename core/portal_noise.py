@@ -9,22 +9,23 @@ it should choose by strength, with a light tree, or by lot.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .openings import Opening
 from .sampling import TIME_BY_LOT, TIME_BY_TREE
 
 Floats = NDArray[np.float64]
 
 COST, COST_BY_LOT = 1.3, 1.05
 """Of a sample that looks for suns and for the sky, against one that only looks for as many suns,
-with a light tree and by lot; these and the next by docs/benchmarks/portals.md."""
+with a light tree and by lot; see docs/benchmarks/portals.md."""
 
-THROUGH = 2.0
-"""Mean square, in squares of the mean, of the sky's light found through openings: places near them
-get more of it."""
+GRID = 6
+"""Points along each side of an opening, by which what comes through it is told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,8 @@ class LightInside:
     """Light at places in a closed scene, as luminance.
 
     sky: radiance in the directions of looks that got out, (n,), evenly over the half sphere above
-    each place; cosines: to the surface, (n,); looks: how many there were in all. facing: irradiance
+    each place; cosines: to the surface, (n,); looks: how many there were in all. through: see
+    `square_through`. facing: irradiance
     that each sun would give each place if nothing stood between, (p, k); suns: what it gives.
     average: radiance of the residual over the whole sphere.
     """
@@ -40,6 +42,7 @@ class LightInside:
     sky: Floats
     cosines: Floats
     looks: int
+    through: float
     facing: Floats
     suns: Floats
     average: float
@@ -90,14 +93,13 @@ def mean_square_untold(light: LightInside, has_table: bool) -> float:
 
 def mean_square_told(light: LightInside) -> float:
     """The same where it is looked for through openings."""
-    sky = 2 * np.pi / light.looks * float(light.sky @ light.cosines)
     if light.by_tree:
         strength = light.facing.sum(axis=1).mean() + np.pi * light.average
         part = np.pi * light.average / strength if strength else 1.0
     else:
         part = 1 / (light.number + 1)
-    through = THROUGH * sky**2 / part if part else 0.0
-    return through + _of_suns(light, np.pi * light.average)
+    sky = light.through / part if part else 0.0
+    return sky + _of_suns(light, np.pi * light.average)
 
 
 def _of_suns(light: LightInside, other: float) -> float:
@@ -112,3 +114,31 @@ def _of_suns(light: LightInside, other: float) -> float:
         chance = np.full_like(light.facing, 1 / max(light.number + (other > 0), 1))
     found = np.divide(light.suns**2, chance, out=np.zeros_like(chance), where=chance > 0)
     return float(found.sum(axis=1).mean()) if len(found) else 0.0
+
+
+def square_through(
+    openings: Sequence[Opening],
+    places: Floats,
+    normals: Floats,
+    radiance: Callable[[Floats], Floats],
+) -> float:
+    """Mean square of the irradiance that samples through openings find at places, (p, 3).
+
+    Of the openings that a place is before one is chosen by lot, and of the directions to it any is
+    as likely. normals: of the surfaces there, (p, 3). radiance: luminance in directions, (n, 3).
+    Nothing is thought to stand between.
+    """
+    squares, before = np.zeros(len(places)), np.zeros(len(places))
+    for opening in openings:
+        points, area = opening.points(GRID)
+        away = points - places[:, None]
+        squared = (away**2).sum(axis=2)
+        directions = away / np.sqrt(np.maximum(squared, 1e-300))[..., None]
+        # Near a place a point's part of the opening is a disc, of a half sphere at most.
+        facing = np.maximum(-(directions @ opening.inwards), 0)
+        angle = area * facing / (squared + area / (2 * np.pi))
+        cosines = np.maximum(np.einsum("pkc,pc->pk", directions, normals), 0)
+        found = radiance(directions.reshape(-1, 3)).reshape(cosines.shape) * cosines
+        squares += angle.sum(axis=1) * (found**2 * angle).sum(axis=1)
+        before += opening.is_before(places)
+    return float(np.mean(before * squares)) if len(places) else 0.0

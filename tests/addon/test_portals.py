@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from sunsplit.addon import known
+from sunsplit.addon import fitted, known
 from sunsplit.addon.fitted import IN_CLOSED
 from sunsplit.addon.restoring import restore_scene
 from sunsplit.addon.scene import convert_scene
@@ -257,6 +257,18 @@ def test_lamps_of_a_closed_scene_are_truer_whoever_makes_portals(sunrise):
     found = convert_scene(scene, ConversionSettings(lights=2)).conversion
     assert len(found.suns) <= 2
     assert "In a closed scene" not in scene.sunsplit.report
+
+
+def test_lamps_before_a_portal_are_truer_still_if_they_are_few(scene, monkeypatch):
+    for few, leniency in ((fitted.FEW, fitted.STRICT), (0, IN_CLOSED)):
+        monkeypatch.setattr(fitted, "FEW", few)
+        known.forget()
+        found = convert_scene(scene, ConversionSettings()).conversion
+        assert portals(scene)
+        assert found.suns
+        assert found.settings.leniency == leniency
+        assert found.predicted_error <= leniency / 100
+        restore_scene(scene)
 
 
 def test_a_ground_under_the_sky_has_no_openings(overcast):

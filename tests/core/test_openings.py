@@ -10,12 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from sunsplit.core.openings import Inside, find_openings, part_seen
+from sunsplit.core.openings import Inside, Opening, find_openings, part_seen
 from sunsplit.core.portal_noise import (
     LightInside,
     mean_square_told,
     mean_square_untold,
     openings_pay,
+    square_through,
     told_at_its_best,
     untold_at_its_best,
 )
@@ -216,8 +217,9 @@ def light(sky, suns, lit=0.02, out=0.02):
     facing = np.full((places, 1), suns)
     given = np.where(np.arange(places) < lit * places, suns, 0.0)[:, None]
     escaped = np.full(int(out * looks), sky)
+    through = 5 * (np.pi * out * sky) ** 2
     return LightInside(
-        escaped, np.full(len(escaped), 0.5), looks, facing, given, sky, facing.shape[1]
+        escaped, np.full(len(escaped), 0.5), looks, through, facing, given, sky, facing.shape[1]
     )
 
 
@@ -250,7 +252,7 @@ def test_suns_of_which_few_give_the_light_are_drawn_by_strength():
     alike = np.full(4, 25.0)
     for strengths, by_tree in ((few, True), (alike, False)):
         facing = np.tile(strengths, (100, 1))
-        inside = LightInside(np.array([0.1]), np.array([0.5]), 1000, facing, facing, 0.1, 4)
+        inside = LightInside(np.array([0.1]), np.array([0.5]), 1000, 0.1, facing, facing, 0.1, 4)
         assert untold_at_its_best(inside, has_table=False).by_tree == by_tree
 
 
@@ -266,3 +268,43 @@ def test_the_part_that_a_window_takes_of_the_half_sphere():
     inside = look_around([WINDOW], count=4000)
     part = part_seen(inside, find_openings(inside))
     assert part == pytest.approx(len(inside.escaped) / (LOOKS * 4000), rel=0.03)
+
+
+def test_what_samples_through_openings_find():
+    """Against directions over the whole sphere, of which few go through them."""
+    x, y, z = np.eye(3)
+    openings = (
+        Opening(np.array([0, 2, 1.5]), x, z, -y, 1.5, 1.0),
+        Opening(np.array([-2, 0, 1.0]), y, z, x, 0.5, 2.0),
+        Opening(np.array([0, 0, 9.0]), x, y, z, 2.0, 2.0),  # all places are behind this one
+    )
+    random = np.random.default_rng(7)
+    places = random.uniform([-1, -1, 0], [1.5, 1.5, 1], (6, 3))
+    normals = random.normal(size=(6, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    away = random.normal(size=(400_000, 3))
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+
+    def radiance(directions):
+        return 1.5 + directions[:, 2] + directions[:, 0]
+
+    expected = 0.0
+    for place, normal in zip(places, normals, strict=True):
+        square = (radiance(away) * np.maximum(away @ normal, 0)) ** 2
+        for opening in openings[:2]:
+            out = opening.is_crossed(np.tile(place, (len(away), 1)), away)
+            expected += 2 * (4 * np.pi) ** 2 * out.mean() * (square * out).mean() / len(places)
+    found = square_through(openings, places, normals, radiance)
+    assert found == pytest.approx(expected, rel=0.04)
+
+
+def test_a_place_in_an_opening_sees_half_a_sphere_of_it():
+    opening = Opening(np.zeros(3), *np.eye(3), 4.0, 4.0)
+    places = np.array([[0.0, 0, 1e-9], [0.3, 0.3, 1e-9]])
+    downwards = np.tile([0, 0, -1.0], (2, 1))
+    found = square_through((opening,), places, downwards, lambda away: np.ones(len(away)))
+    assert 0 < found < (2 * np.pi) * (2 * np.pi / 3) * 1.1
+
+
+def test_no_opening_lets_nothing_through():
+    assert square_through((), np.zeros((1, 3)), np.eye(3)[:1], lambda away: away[:, 0]) == 0
