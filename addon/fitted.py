@@ -33,14 +33,17 @@ in."""
 
 STRICT, FEW = 0.2, 16
 """Leniency where Cycles is told of the openings, unless that takes more suns. With IN_CLOSED rooms
-under nine maps stay wrong by up to 2.4 % RMS, with this by up to 1.1 %; but the 26 suns that one
+under nine maps stay wrong by up to 2.4 % RMS, with this by up to 1.5 %; but the 26 suns that one
 map would take made more noise than that is worth."""
 
 SMALL = 0.1
-"""Of the half sphere above a place, what openings take at most: through larger ones rays find the
-sky by themselves. A window takes .015 of it in the room of docs/benchmarks/portals.md; a missing
-roof takes .23, and portals in it gained nothing under six maps, but up to twice the noise.
-"""
+"""Of the half sphere above a place, openings that leave most of the light outside. A window takes
+.015 of it in the room of docs/benchmarks/portals.md."""
+
+WIDE = 0.18
+"""Openings through which rays find the sky by themselves. Portals in a missing wall, which takes
+.13, pay where they are predicted to; in a missing roof, which takes .23, they gained nothing under
+six maps, but up to twice the noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +82,10 @@ def fitted_conversion(
     reach = yield from _reach(scene, needs)
     visible = yield from _what_is_visible(reach, environment, settings, light)
     closed = (yield from closed_scene(reach)) if reach else None
-    if closed is not None and closed.part >= SMALL:
+    if closed is not None and closed.part >= WIDE:
         closed = None
-    usual = 1.0 if closed is None else IN_CLOSED
+    is_dim = closed is not None and closed.part < SMALL
+    usual = IN_CLOSED if is_dim else 1.0
 
     def convert(part: VisiblePart | None, leniency: float = usual) -> Apart:
         chosen = replace(settings, leniency=leniency)
@@ -94,7 +98,7 @@ def fitted_conversion(
         conversion = yield convert(visible)
         return Fitted(conversion, tree_pays(conversion))
     through = through_openings(visible, closed.part)
-    told = yield convert(through, STRICT)
+    told = yield convert(through, STRICT if is_dim else usual)
     if told.settings.tightens and len(told.suns) > FEW:
         told = yield convert(through)
     untold = yield convert(visible)

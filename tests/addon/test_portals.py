@@ -174,6 +174,21 @@ def no_roof(scene):
     bpy.data.objects.remove(roof)
 
 
+def no_front(scene):
+    """No wall around the window either."""
+    for thing in [t for t in scene.objects if t.type == "MESH" and t.location[0] > 2]:
+        bpy.data.objects.remove(thing)
+
+
+def test_a_missing_wall_gets_a_portal_and_lamps_as_in_the_open(scene):
+    no_front(scene)
+    bpy.context.view_layer.update()
+    found = convert_scene(scene, ConversionSettings()).conversion
+    (portal,) = portals(scene)
+    assert portal.data.size * portal.data.size_y == pytest.approx(4 * 2.6, rel=0.1)
+    assert found.settings.leniency == 1
+
+
 def eevee(scene):
     scene.render.engine = "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
 
