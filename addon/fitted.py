@@ -32,18 +32,18 @@ IN_CLOSED = 0.4
 in."""
 
 STRICT, FEW = 0.2, 16
-"""Leniency where Cycles is told of the openings, unless that takes more suns. With IN_CLOSED rooms
-under nine maps stay wrong by up to 2.4 % RMS, with this by up to 1.5 %; but the 26 suns that one
-map would take made more noise than that is worth."""
+"""Leniency where Cycles is told of SMALL openings, unless that takes more suns. With IN_CLOSED
+rooms under nine maps stay wrong by up to 2.4 % RMS, with this by up to 1.5 %; but the 26 suns that
+one map would take made more noise than that is worth."""
 
 SMALL = 0.1
 """Of the half sphere above a place, openings that leave most of the light outside. A window takes
 .015 of it in the room of docs/benchmarks/portals.md."""
 
 WIDE = 0.18
-"""Openings through which rays find the sky by themselves. Portals in a missing wall, which takes
-.13, pay where they are predicted to; in a missing roof, which takes .23, they gained nothing under
-six maps, but up to twice the noise."""
+"""Openings that need no portals, though `core.openings` may still find them. In a missing wall,
+which takes .13, they pay where they are predicted to; in a missing roof, which takes .23, they
+gained nothing under six maps, but up to twice the noise."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,7 +128,12 @@ def _light_inside(
     lum = luminance(radiance)
     solid = sphere.row_solid_angles(width, height)
     normals = _points(place.normal for place in reach.places[: len(inside.places)])
-    chosen = np.linspace(0, len(normals), min(SUNLIT, len(normals)), endpoint=False).astype(int)
+    # Places outside find the sky by themselves, whoever is told of openings.
+    within = np.any([opening.is_before(inside.places) for opening in closed.openings], axis=0)
+    places, looks = np.flatnonzero(within), within[inside.started]
+    chosen = places[
+        np.linspace(0, len(places), min(SUNLIT, len(places)), endpoint=False).astype(int)
+    ]
     suns = sorted(conversion.suns, key=lambda sun: -float(sun.irradiance @ LUMINANCE_WEIGHTS))
     facing = np.zeros((len(chosen), min(len(suns), MOST_SUNS)))
     lit = np.zeros_like(facing)
@@ -146,10 +151,10 @@ def _light_inside(
         return lum.ravel()[sphere.pixels_at(directions @ to_map.T, width, height)]
 
     return LightInside(
-        sky(inside.escaped),
-        (normals[inside.started] * inside.escaped).sum(axis=1),
-        LOOKS * len(normals),
-        square_through(closed.openings, inside.places, normals, sky),
+        sky(inside.escaped[looks]),
+        (normals[inside.started] * inside.escaped).sum(axis=1)[looks],
+        LOOKS * len(places),
+        square_through(closed.openings, inside.places[places], normals[places], sky),
         facing,
         lit,
         float(weighted_sum(solid, lum.sum(axis=1))) / (4 * np.pi),

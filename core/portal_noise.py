@@ -34,9 +34,10 @@ class LightInside:
 
     sky: radiance in the directions of looks that got out, (n,), evenly over the half sphere above
     each place; cosines: to the surface, (n,); looks: how many there were in all. through: see
-    `square_through`. facing: irradiance
-    that each sun would give each place if nothing stood between, (p, k); suns: what it gives.
-    average: radiance of the residual over the whole sphere.
+    `square_through`. facing: irradiance that each sun would give each place if nothing stood
+    between, (p, k); suns: what it gives. average: radiance of the residual over the whole sphere.
+    number: of all suns, of which the brightest k were asked for. by_tree: whether they are chosen
+    by strength, else by lot.
     """
 
     sky: Floats
@@ -126,7 +127,8 @@ def square_through(
 
     Of the openings that a place is before one is chosen by lot, and of the directions to it any is
     as likely. normals: of the surfaces there, (p, 3). radiance: luminance in directions, (n, 3).
-    Nothing is thought to stand between.
+    Nothing is thought to stand between; and nearer to an opening than a sixth of its size, what
+    comes from aside is not told well.
     """
     squares, before = np.zeros(len(places)), np.zeros(len(places))
     for opening in openings:

@@ -110,8 +110,8 @@ def _fewest_by_edge(
 ) -> ChosenSuns:
     """About as few as are within a part of the mean irradiance.
 
-    Their number is that of the first cells that are, and not of the best: these are within it with
-    one light in thirty less, and take half as long again to find.
+    Their number is about that of the first cells that are, and not of the best: these are within it
+    with one light in thirty less, and take half as long again to find.
     """
     eevee = settings.in_eevee
     few = split_of(_patches(light, strata, FEWEST_SEARCHED), settings.shape, eevee)
@@ -126,6 +126,7 @@ def _fewest_by_edge(
     enough = _for_lights(likely, SEARCHED_PER_LIGHT, FEWEST_SEARCHED)
     patches = _patches(light, strata, enough)
 
+    @cache
     def of_cells(count: int, rough: bool) -> ChosenSuns:
         chosen = edge_suns(patches, strata, settings, count, level=True, rough=rough)
         return _levelled(_judged(chosen, prediction, strata), prediction, strata, allowed)

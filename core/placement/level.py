@@ -60,8 +60,9 @@ def levelled(suns: Sequence[Sun], level: Level, wrong: float, costs: float) -> t
     what makes the worst of these and of shadows best.
 
     wrong: what the suns get wrong at shadows' edges, in parts of `level.shadows`. costs: what a
-    tilt adds to the square of that, by the disc's part of all light, squared, times the tilt,
-    squared, by half the disc's width. Points stay where they are: none lies across the horizon.
+    tilt adds to the square of that, by the disc's part of the suns' light in parts of
+    `level.shadows`, squared, times the tilt, squared, by half the disc's width. Points stay where
+    they are: none lies across the horizon.
     """
     half = np.array([sun.angular_diameter / 2 for sun in suns])
     if not half.any() or np.isnan(level.ground).all():
@@ -97,7 +98,7 @@ class _Discs:
     to_light: unit vectors, (n, 3). half: of their widths, radians, (n,). part: of all light of each
     channel that is asked for, (n, c). luminous: of all luminance, (n,). cost: of a tilt's square,
     in what shadows may be wrong by, squared, (n,). wanted: by ground, then by walls, (k,). limits:
-    so far each may be off, (k,).
+    so far each channel of ground may be off, and for each wall all of them together, (k,).
     """
 
     to_light: Floats
@@ -164,20 +165,22 @@ class _Discs:
         return tilt, given
 
     def _least(self, gain: Floats, lacks: Floats, counts: float) -> Floats:
-        """The tilts, (n,), for which it is the least if each gains evenly, (n, k), and none of them
-        is more than it may be."""
+        """About the tilts, (n,), for which it is the least if each gains evenly, (n, k), and none
+        of them is more than it may be."""
         elevation = np.arcsin(np.clip(self.to_light[:, 2], -1, 1))
         lowest = np.maximum(-MOST * self.half, -np.pi / 2 - elevation)
         highest = np.minimum(MOST * self.half, np.pi / 2 - elevation)
-        ease = 1 / np.maximum(counts * self.cost, 1e-300)
+        ease = 1 / np.sqrt(np.maximum(counts * self.cost, 1e-300))
         tilt = np.zeros(len(self.half))
         free = np.ones(len(tilt), bool)
         for _ in range(FROZEN):
-            # As many equations as things are lacking: these are fewer than discs.
             eased = np.where(free, ease, 0)[:, None] * gain
             fixed = np.where(free, 0, tilt)
-            missing = np.linalg.solve(np.eye(len(lacks)) + gain.T @ eased, lacks - fixed @ gain)
-            tilt = np.clip(eased @ missing + fixed, lowest, highest)
+            # Where one disc alone has all of two channels, products of these are singular.
+            way, size, of_each = np.linalg.svd(eased.T, full_matrices=False)
+            missing = (size / (1 + size**2)) * (way.T @ (lacks - fixed @ gain))
+            tilt = np.where(free, ease * (of_each.T @ missing), fixed)
+            tilt = np.clip(tilt, lowest, highest)
             still = free & (tilt > lowest) & (tilt < highest)
             if still.sum() == free.sum():
                 break

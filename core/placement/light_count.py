@@ -34,8 +34,8 @@ def fewest(
     what takes longer than `with_lights` and is often less wrong.
     Where even `most` are not enough, those that are least wrong of all that were tried. The error
     need not fall evenly with the number; a number smaller by at most an eighth than is returned
-    was tried too, and is not enough: up to 15 lights that is the next smaller one. Of up to FEW so
-    was a number smaller by a quarter, with care.
+    was tried too, without care, and was not enough: up to 15 lights that is the next smaller one.
+    Of up to FEW so was a number smaller by a quarter, with care.
     """
     tried: dict[int, ChosenSuns] = {}
 
@@ -44,20 +44,22 @@ def fewest(
             tried[count] = with_lights(count)
         return tried[count].worst
 
+    def error_with_care(count: int) -> float:
+        if with_care:
+            made = [tried[count]] if count in tried else []
+            tried[count] = min([*made, with_care(count)], key=lambda one: one.worst)
+        return error(count)
+
     low, high = 0, first_guess(allowed, most, expected)
-    while error(high) > allowed:
-        if high >= most:
-            return min(tried.values(), key=lambda one: one.worst)
+    while error(high) > allowed and high < most:
         aim = expected(high) * (allowed / error(high)) ** CAUTION
         low, high = high, _guess(high + 1, aim, most, expected)
+    if error(high) > allowed and error_with_care(high) > allowed:
+        return min(tried.values(), key=lambda one: one.worst)
     while True:
         high = _least_between(low, high, error, allowed)
         fewer = high * 3 // 4
-        if high > FEW or not fewer:
-            return tried[high]
-        if with_care:
-            tried[fewer] = with_care(fewer)
-        if error(fewer) > allowed:
+        if high > FEW or not fewer or error_with_care(fewer) > allowed:
             return tried[high]
         high = fewer
         low = max((n for n in tried if n < high and tried[n].worst > allowed), default=0)

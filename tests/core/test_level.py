@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sunsplit.core import sphere
+from sunsplit.core import ConversionSettings, convert, sphere
 from sunsplit.core.placement.level import MOST, Level, levelled
 from sunsplit.core.suns import disc_on_ground, disc_sun, point_sun
-from tests.maps import direction
+from tests.maps import direction, environment
 
 WHITE = np.ones(3)
 
@@ -120,3 +120,23 @@ def on_ground_of_red(suns) -> np.ndarray:
     half = np.array([sun.angular_diameter / 2 for sun in suns])
     heights = np.array([sun.to_light[2] for sun in suns])
     return np.array([disc_on_ground(heights, half).mean(), 0, 0])
+
+
+def test_colours_that_one_faint_sun_alone_has():
+    """All of red and of blue are in one disc, which may be tilted at no cost."""
+    green, faint = np.array([0, 1.0, 0]), np.array([1e-7, 0, 1e-7])
+    suns = (
+        disc_sun(green, direction(10, 3), 0.05, 2),
+        disc_sun(green, direction(100, 20), 0.05, 2),
+        disc_sun(faint, direction(200, 1), 0.05, 2),
+    )
+    wanted = on_ground(suns) + 0.01
+    assert np.abs(on_ground(raised(suns, wanted)) - wanted).max() <= 1e-3
+
+
+def test_a_map_whose_red_and_blue_are_in_one_faint_sun():
+    pixels = np.zeros((64, 128, 3), np.float32)
+    pixels[...] = 0, 1, 0
+    pixels[20:44, 30:50] = 1e-6
+    conversion = convert(environment(pixels), ConversionSettings(share=1, tolerance=0.5))
+    assert conversion.suns

@@ -163,6 +163,25 @@ def test_fewest_is_enough_and_fewer_are_not(bumps, allowed):
         assert found.n > FEW or errors[found.n * 3 // 4] > allowed
 
 
+@given(
+    st.lists(st.floats(0.5, 2), min_size=40, max_size=40),
+    st.lists(st.floats(0.5, 1), min_size=40, max_size=40),
+    st.floats(0.02, 2),
+)
+def test_the_most_and_a_quarter_fewer_are_tried_with_care(bumps, better, allowed):
+    rough = {n: bump / n for n, bump in enumerate(bumps, start=1)}
+    careful = {n: part * rough[n] for n, part in enumerate(better, start=1)}
+
+    def tell(errors):
+        return lambda n: SimpleNamespace(worst=errors[n], n=n)
+
+    found = fewest(tell(rough), allowed, 40, with_care=tell(careful))
+    if found.worst > allowed:
+        assert min(rough[40], careful[40]) > allowed
+    elif 1 < found.n <= FEW:
+        assert careful[found.n * 3 // 4] > allowed
+
+
 @given(st.floats(0.3, 3), st.floats(0.02, 2))
 def test_a_good_guess_saves_tries(truth, allowed):
     """Of an even error, whether more or less is expected than comes."""
