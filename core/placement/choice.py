@@ -30,7 +30,8 @@ times as soon made."""
 
 SEARCHED_PER_LIGHT, FEWEST_SEARCHED = 32, 512
 """The same where their number is looked for. 2 to 24 lights are as wrong of 512 patches as of
-MOST_PATCHES, but for chance: 1.00 times by the geometric mean of 27 regions of nine maps."""
+MOST_PATCHES, but for chance: 1.00 times by the geometric mean of 27 regions of nine maps. With
+twice as many for each light a search finds .7 % fewer lights, and takes an eighth longer."""
 
 TOLD_BY = 4096
 """Patches by which errors are predicted: as far from what many more tell as MOST_PATCHES are, as
