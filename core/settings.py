@@ -153,7 +153,9 @@ class ConversionSettings:
     @property
     def tolerated(self) -> float:
         """The tolerance in percent, with None resolved: see `allowed_error`."""
-        return TOLERANCE * self.leniency if self.tolerance is None else self.tolerance
+        if self.tolerance is not None:
+            return self.tolerance
+        return TOLERANCE * self.leniency if self.tightens else TOLERANCE
 
     def allowed_error(self, share: float) -> float | None:
         """The tolerance in percent for suns with this share of all light, with None resolved; None

@@ -100,6 +100,9 @@ class EdgeSplit:
         """The best of `enough` cells that were tried."""
         error = _by_error(level)
         cut, *tried = self._first_round(enough, level)
+        if tried:
+            for beginning in self._beginnings[1:]:
+                tried += self._begun(*beginning, enough, level, error(cut))
         best = cut
         for _ in range(2 if tried else 0):
             tried = sorted(tried, key=error)[:GO_ON]
@@ -116,27 +119,35 @@ class EdgeSplit:
         return min([best, *balanced([more], 0)], key=error)
 
     def _first_round(self, enough: int, level: bool) -> list[Trial]:
-        """`enough` cells as they are cut, and more from different beginnings."""
-        return _kept(self._first, (enough, level), lambda: self._begun(enough, level))
+        """`enough` cells as they are cut, and more that begin with colours weighed over the whole
+        light."""
 
-    def _begun(self, count: int, level: bool) -> list[Trial]:
-        """See `_first_round`."""
-        error, owner = _by_error(level), self._truest.owner(count)
-        [cut] = balanced([Trial(self._whole, cells_of(self._whole, owner))], 0)
-        if count == 1:
-            return [cut]
-        begun = []
-        for light, widest in self._beginnings:
-            widest.grow(count)
-            for one in (owner, widest.owner(min(count, widest.count))):
-                begun.append(Trial(light, cells_of(light, one)))
+        def made() -> list[Trial]:
+            cells = cells_of(self._whole, self._truest.owner(enough))
+            [cut] = balanced([Trial(self._whole, cells)], 0)
+            if enough == 1:
+                return [cut]
+            begun = self._begun(*self._beginnings[0], enough, level, _by_error(level)(cut))
+            return [cut, *begun]
+
+        return _kept(self._first, (enough, level), made)
+
+    def _begun(
+        self, light: EdgeLight, widest: Cuts, count: int, level: bool, worst: float
+    ) -> list[Trial]:
+        """So many cells from different beginnings; again, more gently, where they end up more wrong
+        than `worst`."""
+        error = _by_error(level)
+        widest.grow(count)
+        owners = self._truest.owner(count), widest.owner(min(count, widest.count))
+        begun = [Trial(light, cells_of(light, owner)) for owner in owners]
         tried = balanced(begun, FIRST)
         worse = [
             replace(before, together=GENTLER * before.together)
             for before, after in zip(begun, tried, strict=True)
-            if error(after) > error(cut)
+            if error(after) > worst
         ]
-        return [cut, *tried, *(balanced(worse, FIRST) if worse else [])]
+        return [*tried, *(balanced(worse, FIRST) if worse else [])]
 
     def error_of_cuts(self, count: int) -> float:
         """About what so many cells get wrong: before they are balanced; see `PatchCells.error`."""

@@ -286,6 +286,17 @@ def test_lamps_before_a_portal_are_truer_still_if_they_are_few(scene, monkeypatc
         restore_scene(scene)
 
 
+def test_where_truer_lamps_do_not_pay_usual_ones_may(scene, monkeypatch):
+    for answers, leniency in (((False, True), IN_CLOSED), ((False, False), IN_CLOSED)):
+        said = iter(answers)
+        monkeypatch.setattr(fitted, "openings_pay", lambda *_, said=said: next(said))
+        known.forget()
+        found = convert_scene(scene, ConversionSettings()).conversion
+        assert bool(portals(scene)) == answers[-1]
+        assert found.settings.leniency == leniency
+        restore_scene(scene)
+
+
 def test_a_ground_under_the_sky_has_no_openings(overcast):
     scene = fresh_scene()
     hdri_world(scene, overcast)

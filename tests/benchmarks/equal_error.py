@@ -36,9 +36,10 @@ PLAIN, SPLIT = "plain HDRI", "Sunsplit"
 BY_HAND = ("NONE", "256", "512", "1024", "2048", "4096")
 TARGETS = (0.05, 0.02)
 
-BRIGHTEST = {"glossy": 10.0}
-"""Scenes whose pictures count up to so many of their medians, as on a display: a mirrored sun in
-them, a fiftieth of a pixel wide, is met by one sample in thousands and outshines all else."""
+BRIGHTEST = {"glossy": 1 / 0.18}
+"""Scenes whose pictures count up to so many of their medians, as on a display that shows these as
+middle grey: a mirrored sun in them, a fiftieth of a pixel wide, is met by one sample in thousands
+and outshines all else."""
 
 TILES = 8
 """Along a picture's side, whose means are taken as independent of each other."""
