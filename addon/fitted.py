@@ -99,15 +99,17 @@ def fitted_conversion(
         return Fitted(conversion, tree_pays(conversion))
     untold = yield convert(visible)
     outside = yield from closed.light(untold, light.map_from_world)
+    best = without = Fitted(untold, tree_pays(untold))
     through = through_openings(visible, closed.part)
-    for leniency in (STRICT, IN_CLOSED) if is_dim else (usual,):
+    for leniency in (STRICT, usual) if is_dim else (usual,):
         told = yield convert(through, leniency)
-        if leniency == STRICT and told.settings.tightens and len(told.suns) > FEW:
+        tightens = told.settings.tightens
+        if leniency < usual and tightens and len(told.suns) > FEW:
             continue
         inside = yield from closed.light(told, light.map_from_world)
         by_portals = Fitted(told, by_tree=True, openings=closed.openings)
-        best = _calmer(by_portals, inside, Fitted(untold, tree_pays(untold)), outside, needs)
-        if best.openings or not told.settings.tightens:
+        best = _calmer(by_portals, inside, without, outside, needs)
+        if best.openings or not tightens or not told.suns:
             break
     return best
 

@@ -15,8 +15,8 @@ LARGE = 40_000
 large has no one surroundings, and solving for it would take seconds."""
 
 PARTS, A_PART = 8, 4000
-"""Groups are solved for in so many parts at most, of so many pixels at least, by all cores. Even
-one core is done sooner than with all of them at once, by a tenth."""
+"""Groups are solved for in so many parts at most, of so many pixels on average at least, by all
+cores. Even one core is done sooner than with all of them at once, by a tenth."""
 
 
 def surroundings(radiance: NDArray[np.float32], region: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -46,7 +46,8 @@ def surroundings(radiance: NDArray[np.float32], region: NDArray[np.bool_]) -> ND
     rimmed = np.bincount(owner[small], outside.any(axis=1), count) > 0
     smooth = np.flatnonzero(rimmed[owner[small]])
     # What does not touch does not matter to each other.
-    part = _parts(np.bincount(owner[small[smooth]], minlength=count))[owner[small[smooth]]]
+    groups = owner[small[smooth]]
+    part = _parts(np.bincount(groups, minlength=count))[groups]
     numbers = np.empty(height * width, np.int32)
 
     def fill(number: int) -> None:
@@ -61,13 +62,14 @@ def surroundings(radiance: NDArray[np.float32], region: NDArray[np.bool_]) -> ND
 
 
 def _parts(size: NDArray[np.intp]) -> NDArray[np.intp]:
-    """To which part each group of so many pixels belongs, (n,): about as many pixels in each, and
-    the same however many cores there are, as digits hang on it."""
-    pixels = np.zeros(np.clip(size.sum() // A_PART, 1, PARTS))
-    part = np.zeros(len(size), np.intp)
-    for group in np.argsort(-size, kind="stable"):
-        part[group] = pixels.argmin()
-        pixels[part[group]] += size[group]
+    """To which part each group of so many pixels belongs, (n,), the largest to the first: as even
+    as whole groups allow, and the same however many cores there are, as digits hang on it."""
+    part, order = np.zeros(len(size), np.intp), np.argsort(-size, kind="stable")
+    order = order[: np.count_nonzero(size)]
+    ends = np.cumsum(size[order])
+    parts = np.clip(size.sum() // A_PART, 1, PARTS)
+    middle = (2 * ends - size[order]) * parts // (2 * max(size.sum(), 1))
+    part[order] = np.unique(middle, return_inverse=True)[1]
     return part
 
 
@@ -95,7 +97,7 @@ def _harmonic(
     ends = np.concatenate([[0], np.cumsum(held.sum(axis=1))]).astype(np.int32)
     matrix = csc_array((values, places, ends), shape=(count, count))
     rows, rim = np.nonzero(outside)[0], flat[near[outside]]
-    given = np.stack([np.bincount(rows, values, count) for values in rim.T], axis=-1)
+    given = np.stack([np.bincount(rows, channel, count) for channel in rim.T], axis=-1)
     # And it needs no pivots: so ordered, it takes less. Its columns have little in common: one at a
     # time takes half of what panels of many take.
     ways = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}, "panel_size": 1}

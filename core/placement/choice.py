@@ -124,12 +124,12 @@ def _fewest_by_edge(
         return hypot(BALANCED * few.error_of_cuts(count) * share, prediction.of_residual)
 
     likely = first_guess(allowed, settings.most_lights, expected)
-    # The same for all numbers, so that they share their cuts.
-    enough = _for_lights(likely, SEARCHED_PER_LIGHT, FEWEST_SEARCHED)
-    patches = _patches(light, strata, enough)
 
     @cache
     def of_cells(count: int, rough: bool) -> ChosenSuns:
+        # Mostly the same for all numbers, so that they share their cuts.
+        enough = _for_lights(max(count, likely), SEARCHED_PER_LIGHT, FEWEST_SEARCHED)
+        patches = _patches(light, strata, enough)
         chosen = edge_suns(patches, strata, settings, count, level=True, rough=rough)
         return _levelled(_judged(chosen, prediction, strata), prediction, strata, allowed)
 

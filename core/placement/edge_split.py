@@ -58,8 +58,9 @@ def edge_split(
     """At most `count` cells: as many as make the predicted error smaller, until it is `allowed`.
 
     patches: some, all of them lit. allowed: a part of all light; see `PatchCells.error`. level:
-    whether they are chosen by `PatchCells.level_error` instead. rough: of the first round, in less
-    than half the time; half of all are wrong by less than a fiftieth more. fades: see `EdgeLight`.
+    whether they are chosen by `PatchCells.level_error` instead. rough: of half of the first round,
+    in little more than a quarter of the time; half of all are wrong by at most 3.4 % more. fades:
+    see `EdgeLight`.
     """
     split = split_of(patches, shape, fades)
     return split.rough(count, allowed, level) if rough else split.cells(count, allowed, level)
@@ -119,8 +120,8 @@ class EdgeSplit:
         return min([best, *balanced([more], 0)], key=error)
 
     def _first_round(self, enough: int, level: bool) -> list[Trial]:
-        """`enough` cells as they are cut, and more that begin with colours weighed over the whole
-        light."""
+        """`enough` cells as they are cut, and more that share out their borders by colours weighed
+        over the whole light."""
 
         def made() -> list[Trial]:
             cells = cells_of(self._whole, self._truest.owner(enough))
@@ -133,10 +134,10 @@ class EdgeSplit:
         return _kept(self._first, (enough, level), made)
 
     def _begun(
-        self, light: EdgeLight, widest: Cuts, count: int, level: bool, worst: float
+        self, light: EdgeLight, widest: Cuts, count: int, level: bool, of_cut: float
     ) -> list[Trial]:
-        """So many cells from different beginnings; again, more gently, where they end up more wrong
-        than `worst`."""
+        """So many cells by one way to weigh colours, from two beginnings; again, more gently, where
+        they end up more wrong than cells as they are cut, `of_cut`."""
         error = _by_error(level)
         widest.grow(count)
         owners = self._truest.owner(count), widest.owner(min(count, widest.count))
@@ -145,7 +146,7 @@ class EdgeSplit:
         worse = [
             replace(before, together=GENTLER * before.together)
             for before, after in zip(begun, tried, strict=True)
-            if error(after) > worst
+            if error(after) > of_cut
         ]
         return [*tried, *(balanced(worse, FIRST) if worse else [])]
 

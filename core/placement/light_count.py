@@ -34,11 +34,11 @@ def fewest(
     `ChosenSuns.worst`.
 
     expected: about how wrong so many are; a guess, so that few numbers must be tried. with_care:
-    what takes longer than `with_lights` and is often less wrong, if at most PROMISING times.
+    what takes longer than `with_lights` and is often less wrong.
     Where even `most` are not enough, those that are least wrong of all that were tried. The error
     need not fall evenly with the number; a number smaller by at most an eighth than is returned
     was tried too, without care, and was not enough: up to 15 lights that is the next smaller one.
-    Of up to FEW so was a number smaller by a quarter, with care.
+    Of up to FEW so was a number smaller by a quarter, with care if that was PROMISING.
     """
     tried: dict[int, ChosenSuns] = {}
 
@@ -48,7 +48,7 @@ def fewest(
         return tried[count].worst
 
     def error_with_care(count: int) -> float:
-        if with_care and allowed < error(count) <= PROMISING * allowed:
+        if with_care and error(count) > allowed:
             tried[count] = min(tried[count], with_care(count), key=lambda one: one.worst)
         return error(count)
 
@@ -61,7 +61,9 @@ def fewest(
     while True:
         high = _least_between(low, high, error, allowed)
         fewer = high * 3 // 4
-        if high > FEW or not fewer or error_with_care(fewer) > allowed:
+        if high > FEW or not fewer or error(fewer) > PROMISING * allowed:
+            return tried[high]
+        if error_with_care(fewer) > allowed:
             return tried[high]
         high = fewer
         low = max((n for n in tried if n < high and tried[n].worst > allowed), default=0)

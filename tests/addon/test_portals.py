@@ -294,6 +294,7 @@ def test_where_truer_lamps_do_not_pay_usual_ones_may(scene, monkeypatch):
         found = convert_scene(scene, ConversionSettings()).conversion
         assert bool(portals(scene)) == answers[-1]
         assert found.settings.leniency == leniency
+        assert next(said, None) is None
         restore_scene(scene)
 
 

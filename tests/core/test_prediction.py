@@ -166,7 +166,7 @@ def test_fewest_is_enough_and_fewer_are_not(bumps, allowed):
 
 @given(
     st.lists(st.floats(0.5, 2), min_size=40, max_size=40),
-    st.lists(st.floats(1 / PROMISING, 1), min_size=40, max_size=40),
+    st.lists(st.floats(0.5, 1), min_size=40, max_size=40),
     st.floats(0.02, 2),
 )
 def test_the_most_and_a_quarter_fewer_are_tried_with_care(bumps, better, allowed):
@@ -179,8 +179,10 @@ def test_the_most_and_a_quarter_fewer_are_tried_with_care(bumps, better, allowed
     found = fewest(tell(rough), allowed, 40, with_care=tell(careful))
     if found.worst > allowed:
         assert min(rough[40], careful[40]) > allowed
+        assert found.worst <= careful[40]
     elif 1 < found.n <= FEW:
-        assert careful[found.n * 3 // 4] > allowed
+        fewer = found.n * 3 // 4
+        assert careful[fewer] > allowed or rough[fewer] > PROMISING * allowed
 
 
 @given(st.floats(0.3, 3), st.floats(0.02, 2))
