@@ -115,6 +115,7 @@ def _plot(rows: Sequence[Row], path: Path) -> None:
         axes.plot(seconds, places, "o", color=colour, label=name)
     for row, place in zip(rows, places, strict=True):
         axes.plot(row.seconds[[0, 2], 0], [place] * 2, color="#cccccc", zorder=0)
+    axes.set_ylim(-0.5, len(rows) - 0.5)
     axes.set_yticks(places, [f"{row.split.map}, {row.split.scene}" for row in rows])
     if any(np.isfinite(row.seconds[:, 0]).any() for row in rows):
         axes.set_xscale("log")  # where some error is ever reached
