@@ -6,6 +6,7 @@ Functions are sent by their names alone, so that nothing but a worker has to fin
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
 import operator
 import pkgutil
@@ -87,7 +88,7 @@ class Link:
 
         self._leave()
         try:
-            with _without(VersionMismatchWarning) as self.mismatches:
+            with _without(VersionMismatchWarning) as self.mismatches, _uncollected():
                 self._client = Client(
                     self.address,
                     timeout=CONNECT,
@@ -185,6 +186,19 @@ def _without(kind: type[Warning]) -> Iterator[list[Warning]]:
             found.append(each.message)
         else:
             warnings.warn_explicit(each.message, each.category, each.filename, each.lineno)
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """No garbage is collected meanwhile: a client that never reached its scheduler may be among it,
+    which then closes, and would wait for ever for the lock of the one that begins."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import shutil
@@ -20,6 +21,7 @@ from sunsplit.core.files.journal import HIDDEN
 from sunsplit.core.library import cluster as under_test
 from sunsplit.core.library.cluster import DEATHS, ClusterWorkers
 from sunsplit.core.library.events import Settled
+from sunsplit.core.library.link import Link
 from sunsplit.core.library.local import Task
 from sunsplit.core.library.options import LibraryOptions
 from sunsplit.core.library.planned import plan_library
@@ -29,7 +31,7 @@ from tests.dask_cluster import Cluster, Process, wait
 from tests.files import COMMAND, noise, sunny, sunsplit, write_hdr
 from tests.libraries import REPORT, contents, write_maps
 
-pytest.importorskip("distributed")
+distributed = pytest.importorskip("distributed")
 
 QUICK = LibraryOptions(settings=ConversionSettings(method="median-cut", lights=8, share=0.3))
 
@@ -340,6 +342,23 @@ def test_no_scheduler_and_no_workers(cluster, tmp_path, maps):
             run.ended()
     assert len(run.notices) == 1
     assert "has no workers: waiting for some" in run.notices[0]
+
+
+def test_no_garbage_is_collected_while_a_connection_begins(team, monkeypatch):
+    collects = []
+
+    class Watched(distributed.Client):
+        def start(self, **options):
+            collects.append(gc.isenabled())
+            return super().start(**options)
+
+    monkeypatch.setattr(distributed, "Client", Watched)
+    link = Link(team.address)
+    link.open()
+    assert link.connect()
+    link.close()
+    assert collects == [False]
+    assert gc.isenabled()
 
 
 def test_command_line_and_a_bug_on_a_worker(team, tmp_path, maps, local):
