@@ -20,7 +20,8 @@ FEW = 24
 would have got fewer of them."""
 
 PROMISING = 1.6
-"""With care cells are rarely less wrong than by this part: once in 84 regions under nine maps."""
+"""Of 84 numbers of lights under nine maps, a quarter smaller than what was enough, four were enough
+with care: without, these were wrong by at most 1.53 times what is allowed."""
 
 
 def fewest(

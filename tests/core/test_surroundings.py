@@ -36,7 +36,7 @@ def test_all_that_is_filled_is_the_mean_of_its_neighbours(in_many_parts, seed):
     filled[region] = surroundings.surroundings(radiance, region)
     near = sphere.neighbours(np.flatnonzero(region), WIDTH, HEIGHT)
     wanted = filled.reshape(-1, 3)[near].mean(axis=1, dtype=np.float64)
-    np.testing.assert_allclose(filled[region], wanted, rtol=1e-6)
+    np.testing.assert_allclose(filled[region], wanted, rtol=1e-6)  # as single precision holds it
 
 
 def test_what_is_filled_does_not_hang_on_the_number_of_cores(in_many_parts, monkeypatch):
@@ -59,6 +59,7 @@ def test_a_large_group_gets_the_mean_of_its_rim(in_many_parts, monkeypatch):
         sphere.neighbours(np.flatnonzero(mine), WIDTH, HEIGHT), np.flatnonzero(region)
     )
     found = surroundings.surroundings(radiance, region)
+    # A pixel of the rim counts as often as it touches.
     least, most = (radiance.reshape(-1, 3)[rim].mean(axis=0) * part for part in (0.8, 1.2))
     flat = found[mine[region]]
     assert np.all(flat == flat[0])
@@ -72,7 +73,7 @@ def test_no_region_and_nothing_but_region():
     assert not surroundings.surroundings(radiance, np.ones_like(region)).any()
 
 
-def test_groups_are_dealt_out_evenly(in_many_parts):
+def test_the_largest_group_is_of_the_first_part_and_no_part_is_empty(in_many_parts):
     sizes = np.array([0, 5, 300, 7, 0, 5, 6, 90, 4, 3])
     parts = surroundings._parts(sizes)
     used = np.bincount(parts[sizes > 0])
