@@ -13,7 +13,7 @@ from ..core.openings import Opening
 from ..core.portal_noise import LightInside, openings_pay, told_at_its_best, untold_at_its_best
 from ..core.sampling import BY_PORTALS, WorldSampling, choose_sampling
 from ..core.settings import ConversionSettings
-from ..core.visible import VisiblePart, through_openings, visible_part
+from ..core.visible import VisiblePart, to_indoors, visible_part
 from .images import READ
 from .known import known_conversion
 from .light_tree import tree_pays
@@ -26,19 +26,6 @@ from .world import WorldLight, is_animated
 MADE = 0.9
 """Of the time of a conversion, about, until its maps are written."""
 
-
-IN_CLOSED = 0.4
-"""Leniency in a closed scene, whose openings' edges stand before all the little light that comes
-in."""
-
-STRICT, FEW = 0.2, 16
-"""Leniency where Cycles is told of SMALL openings, unless that takes more suns or portals would not
-pay. With IN_CLOSED rooms under nine maps stay wrong by up to 2.4 % RMS, with this by up to 1.5 %;
-but the 26 suns that one map would take made more noise than that is worth."""
-
-SMALL = 0.1
-"""Of the half sphere above a place, openings that leave most of the light outside. A window takes
-.015 of it in the room of docs/benchmarks/portals.md."""
 
 WIDE = 0.18
 """Openings that need no portals, though `core.openings` may still find them. In a missing wall,
@@ -84,34 +71,26 @@ def fitted_conversion(
     closed = (yield from closed_scene(reach)) if reach else None
     if closed is not None and closed.part >= WIDE:
         closed = None
-    is_dim = closed is not None and closed.part < SMALL
-    usual = IN_CLOSED if is_dim else 1.0
 
-    def convert(part: VisiblePart | None, leniency: float = usual) -> Apart:
-        chosen = replace(settings, leniency=leniency)
+    def convert(part: VisiblePart | None) -> Apart:
         return Apart(
-            lambda listen, _: known_conversion(environment, chosen, part, listen), READ, MADE
+            lambda listen, _: known_conversion(environment, settings, part, listen), READ, MADE
         )
 
-    # Where the user has made portals, or no light is left for any, there is nothing to decide.
-    if closed is None or has_portals(scene) or not settings.leaves_residual:
+    if closed is None:
         conversion = yield convert(visible)
         return Fitted(conversion, tree_pays(conversion))
-    untold = yield convert(visible)
+    indoors = closed.indoors(environment, light.map_from_world)
+    untold = yield convert(to_indoors(visible, indoors))
+    without = Fitted(untold, tree_pays(untold))
+    # Where the user has made portals, or no light is left for any, there is nothing to decide.
+    if has_portals(scene) or not settings.leaves_residual:
+        return without
+    told = yield convert(to_indoors(visible, indoors, closed.part))
+    by_portals = Fitted(told, by_tree=True, openings=closed.openings)
     outside = yield from closed.light(untold, light.map_from_world)
-    best = without = Fitted(untold, tree_pays(untold))
-    through = through_openings(visible, closed.part)
-    for leniency in (STRICT, usual) if is_dim else (usual,):
-        told = yield convert(through, leniency)
-        tightens = told.settings.tightens
-        if leniency < usual and tightens and len(told.suns) > FEW:
-            continue
-        inside = yield from closed.light(told, light.map_from_world)
-        by_portals = Fitted(told, by_tree=True, openings=closed.openings)
-        best = _calmer(by_portals, inside, without, outside, needs)
-        if best.openings or not tightens or not told.suns:
-            break
-    return best
+    inside = yield from closed.light(told, light.map_from_world)
+    return _calmer(by_portals, inside, without, outside, needs)
 
 
 def _calmer(

@@ -76,7 +76,7 @@ def known_conversion(
     progress: Progress = silent,
 ) -> Conversion:
     """A conversion of a map, one of the last if it is the same."""
-    made_for = settings, visible.key if visible else None
+    made_for = settings, visible.whole_key if visible else None
     known = next((one for one in _last if one.environment is environment), None)
     if known and made_for in known.made:
         return known.made[made_for]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import bpy
@@ -13,10 +14,12 @@ from numpy.typing import NDArray
 
 from ..core import sphere
 from ..core.conversion import Conversion
-from ..core.environment import LUMINANCE_WEIGHTS, luminance
+from ..core.environment import LUMINANCE_WEIGHTS, EnvironmentMap, luminance
+from ..core.indoors import Indoors
 from ..core.openings import WIDEST, Inside, Opening, find_openings, may_be_closed, part_seen
 from ..core.portal_noise import LightInside, square_through
 from ..core.sums import weighted_sum
+from ..core.visible import light_of_cells
 from .images import READ
 from .lamps import remove_lamps, unlink_lamps
 from .rays import LOOKS, Reach
@@ -43,6 +46,9 @@ MOST_SUNS = 16
 SUNLIT = 600
 """Places that are asked for suns."""
 
+MOST_LIT = 600
+"""Places that suns are chosen for."""
+
 
 @dataclass(frozen=True, eq=False)
 class ClosedScene:
@@ -56,6 +62,32 @@ class ClosedScene:
     @property
     def part(self) -> float:
         return part_seen(self.inside, self.openings)
+
+    @cached_property
+    def within(self) -> NDArray[np.intp]:
+        """The places that are inside."""
+        before = [opening.is_before(self.inside.places) for opening in self.openings]
+        return np.flatnonzero(np.any(before, axis=0))
+
+    @cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """Of the surface at each place, (p, 3)."""
+        return _points(place.normal for place in self.reach.places[: len(self.inside.places)])
+
+    def some_within(self, most: int) -> NDArray[np.intp]:
+        """Of the places inside about so many, evenly."""
+        count = len(self.within)
+        return self.within[np.linspace(0, count, min(most, count), endpoint=False).astype(int)]
+
+    def indoors(self, environment: EnvironmentMap, to_map: NDArray[np.float64]) -> Indoors:
+        """What a map's light may reach. to_map: rotation (3, 3) from the scene's axes."""
+        places = self.some_within(MOST_LIT)
+        return Indoors(
+            self.inside.places[places] @ to_map.T,
+            self.normals[places] @ to_map.T,
+            tuple(opening.turned(to_map) for opening in self.openings),
+            light_of_cells(environment),
+        )
 
     def light(self, conversion: Conversion, to_map: NDArray[np.float64]) -> Steps[LightInside]:
         """Of a conversion with a residual. to_map: rotation (3, 3) from the scene's axes."""
@@ -127,13 +159,9 @@ def _light_inside(
     height, width = radiance.shape[:2]
     lum = luminance(radiance)
     solid = sphere.row_solid_angles(width, height)
-    normals = _points(place.normal for place in reach.places[: len(inside.places)])
     # Places outside find the sky by themselves, whoever is told of openings.
-    within = np.any([opening.is_before(inside.places) for opening in closed.openings], axis=0)
-    places, looks = np.flatnonzero(within), within[inside.started]
-    chosen = places[
-        np.linspace(0, len(places), min(SUNLIT, len(places)), endpoint=False).astype(int)
-    ]
+    normals, places, chosen = closed.normals, closed.within, closed.some_within(SUNLIT)
+    looks = np.isin(inside.started, places)
     suns = sorted(conversion.suns, key=lambda sun: -float(sun.irradiance @ LUMINANCE_WEIGHTS))
     facing = np.zeros((len(chosen), min(len(suns), MOST_SUNS)))
     lit = np.zeros_like(facing)

@@ -44,14 +44,18 @@ def predicted(conversion: Conversion | WrittenConversion) -> str:
     return text.format(edges=edges, ground=ground, walls=walls)
 
 
+def _predicted_indoors(conversion: Conversion) -> str:
+    text = said("By prediction right within {error:.2%} where light comes in through openings")
+    return text.format(error=conversion.predicted_error)
+
+
 def made_sentences(conversion: Conversion) -> list[str]:
     """How true it is, and what the user should know of it."""
     lines = []
     if conversion.suns:
-        lines.append(predicted(conversion))
-        if conversion.settings.tightens:
-            text = said("In a closed scene little light comes in, so lamps are truer than usual.")
-            lines.append(text)
+        lines.append(
+            _predicted_indoors(conversion) if conversion.is_indoors else predicted(conversion)
+        )
     if conversion.residual is not None:
         error = conversion.account.relative_error.max()
         lines.append(said("Account: lamps + world = map within {error:.0e}").format(error=error))

@@ -19,7 +19,7 @@ from .settings import ConversionSettings
 from .share import choose_strata
 from .strata import Strata
 from .suns import Sun
-from .visible import VisiblePart
+from .visible import VisiblePart, to_indoors
 from .whole_lights import suns_for_whole_lights
 
 
@@ -33,7 +33,8 @@ class Conversion:
     samples: what a Voronoi residual was made of, else None. predicted_error: what shadows of the
     suns are wrong by, as a part of the mean irradiance; see `prediction.Prediction`, and
     `placement.ChosenSuns.standing_error` for walls. ground_error:
-    what level ground in the open gets wrong of the worst channel, as a part of its irradiance.
+    what level ground in the open gets wrong of the worst channel, as a part of its irradiance; 0
+    where it is indoors.
     visible: what suns were chosen from, where that is not the whole map. notes: plain sentences
     for the user.
     """
@@ -57,6 +58,11 @@ class Conversion:
     def visible_share(self) -> float:
         """Part of the visible luminance that the suns give."""
         return float(self.account.suns @ LUMINANCE_WEIGHTS) / self.strata.light
+
+    @property
+    def is_indoors(self) -> bool:
+        """Whether errors are predicted for places that light reaches through openings only."""
+        return self.visible is not None and self.visible.indoors is not None
 
     @property
     def width_that_lights(self) -> int | None:
@@ -85,7 +91,8 @@ def convert(
     the residual, unless the share or the target asks for all of the map.
     """
     settings = settings or ConversionSettings()
-    visible = visible if settings.chooses_border else None
+    visible = _what_counts(visible, settings)
+    indoors = visible.indoors if visible else None
     progress("strata", 0.0)
     strata = choose_strata(environment, settings, visible)
     progress("region A", 0.3)
@@ -94,12 +101,12 @@ def convert(
     )
     progress("suns", 0.5)
     if settings.takes_whole_lights:
-        light, chosen, notes = suns_for_whole_lights(light, strata, settings)
+        light, chosen, notes = suns_for_whole_lights(light, strata, settings, indoors)
     else:
         notes = ()
         shadowed = settings.shadowed_residual
         unshadowed = None if shadowed else light_of_map(without(environment, light))
-        chosen = choose_suns(light, strata, settings, unshadowed)
+        chosen = choose_suns(light, strata, settings, unshadowed, indoors)
     progress("residual", 0.7)
     residual, levelled, samples = None, None, None
     notes = (*_share_note(strata, settings), *notes, *chosen.notes)
@@ -128,6 +135,15 @@ def convert(
         visible,
         notes,
     )
+
+
+def _what_counts(visible: VisiblePart | None, settings: ConversionSettings) -> VisiblePart | None:
+    """All of the map where that is asked for, but to no other places."""
+    if visible is None or settings.chooses_border:
+        return visible
+    if visible.indoors is None or not settings.shadowed_residual:
+        return None
+    return to_indoors(None, visible.indoors)
 
 
 def _share_note(strata: Strata, settings: ConversionSettings) -> tuple[str, ...]:

@@ -117,6 +117,11 @@ class Opening:
         """Whether points (n, 3) are inside, seen from here."""
         return (points - self.centre) @ self.inwards > 0
 
+    def turned(self, rotation: Floats) -> Opening:
+        """The same in other axes. rotation: (3, 3)."""
+        vectors = {name: getattr(self, name) for name in ("centre", "across", "up", "inwards")}
+        return replace(self, **{name: rotation @ vector for name, vector in vectors.items()})
+
     def points(self, side: int) -> tuple[Floats, float]:
         """Evenly over the rectangle, (side * side, 3), and the area that each stands for."""
         part = (np.arange(side) + 0.5) / side - 0.5

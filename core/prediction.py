@@ -2,19 +2,22 @@
 
 Surfaces that face anywhere look at walls and cones in front of the sky; most of those are aimed at
 the light that suns replace. The difference of their irradiance, with the light and with the suns,
-is what a picture would be wrong by.
+is what a picture would be wrong by. Indoors, where the openings are known that light comes in
+through, it is told for places that are there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
 from .environment import LUMINANCE_WEIGHTS
+from .indoors import BOUNCED, Indoors
 from .patches import Patches
 from .shadow_edges import facing_up, half_widths
 from .standing import discs_on_walls, on_walls
@@ -48,6 +51,10 @@ it is right to 1e-4, mostly far better, where predictions are good to a tenth.""
 
 SHARP = 1e-7
 """Half the width of a point, radians."""
+
+BALANCED, BALANCED_INDOORS = 1.6, 25.0
+"""What is predicted of lights, about, against what is wrong of their cells when these are cut:
+guesses to begin with. Indoors it is a part of what falls in directly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,14 +92,15 @@ class Surfaces:
             total += seen.sum(axis=0)
         return total * whole
 
-    def of(self, patches: Patches) -> Floats:
-        """Of each surface, luminance, (s,)."""
-        flux = patches.flux @ LUMINANCE_WEIGHTS
-        return self.irradiance(patches.directions, flux, half_widths(patches.spread))
-
     def in_the_open(self) -> Surfaces:
         """The same surfaces without anything in front of them."""
         return Surfaces(self.normals, self.axes, np.full_like(self.radii, SHARP))
+
+
+def _lit(surfaces: Surfaces | Indoors, patches: Patches) -> Floats:
+    """Luminance that each surface gets, (s,)."""
+    flux = patches.flux @ LUMINANCE_WEIGHTS
+    return surfaces.irradiance(patches.directions, flux, half_widths(patches.spread))
 
 
 def surfaces_for(light: Sequence[Patches], all_light: float) -> Surfaces:
@@ -124,23 +132,36 @@ class Prediction:
     """What surfaces should get from suns.
 
     irradiance: of each surface, luminance, (s,). mean: what surfaces get in the open from the
-    whole map, on average over all that they may face. ground: what level ground gets in the open,
+    whole map, on average over all that they may face; indoors what a picture shows on average.
+    ground: what level ground gets in the open,
     as a part of the light that suns replace, of each channel; nan where a channel has none, (3,).
     standing: what walls on level ground get, as parts of the luminous light that suns replace,
     (WALLS,); None where the ground does not hide all light below the horizon, as in EEVEE.
     part: of all light that suns replace. of_residual: what the rest of the light is wrong by, where
-    it is shown without its shadows, as `error` counts: no suns mend that. in_eevee: see
-    `two_orders`.
+    it is shown without its shadows, as `error` counts: no suns mend that. of_cuts: how wrong suns
+    are, about, against what is wrong of their cells when these are cut. in_eevee: see `two_orders`.
     """
 
-    surfaces: Surfaces
+    surfaces: Surfaces | Indoors
     irradiance: Floats
     mean: float
     ground: Floats
     standing: Floats | None
     part: float
     of_residual: float = 0.0
+    of_cuts: float = 0.0
     in_eevee: bool = False
+
+    @classmethod
+    def indoors(cls, patches: Patches, all_light: float, indoors: Indoors) -> Prediction:
+        """For a scene that light comes into through openings only. Level ground and walls count as
+        what is there. patches, all_light: see `of`."""
+        flux = patches.flux @ LUMINANCE_WEIGHTS
+        wanted = _lit(indoors, patches)
+        direct = indoors.mean_irradiance(patches.directions, flux, wanted)
+        mean, part = max(BOUNCED * direct, 1e-300), float(flux.sum()) / all_light
+        of_cuts = BALANCED_INDOORS * float(np.mean(wanted)) / mean
+        return cls(indoors, wanted, mean, np.full(3, np.nan), None, part, of_cuts=of_cuts)
 
     @classmethod
     def of(
@@ -159,13 +180,13 @@ class Prediction:
         wanted = np.zeros(SURFACES)
         of_residual = 0.0
         if patches is not None:
-            wanted += surfaces.of(patches)
+            wanted += _lit(surfaces, patches)
         if unshadowed is not None:
             if in_eevee:
                 shown = irradiance_of_two_orders(unshadowed, surfaces.normals)
             else:
-                shown = surfaces.in_the_open().of(unshadowed)
-            lacking = surfaces.of(unshadowed) - shown
+                shown = _lit(surfaces.in_the_open(), unshadowed)
+            lacking = _lit(surfaces, unshadowed) - shown
             wanted += lacking
             of_residual = float(np.sqrt(np.mean(lacking**2))) / (all_light / 4)
         ground, standing, part = np.full(3, np.nan), None, 0.0
@@ -178,19 +199,31 @@ class Prediction:
                 patches.flux, facing_up(patches.directions, half_widths(patches.spread))
             )
             part = float(flux.sum()) / all_light
-        return cls(surfaces, wanted, all_light / 4, ground, standing, part, of_residual, in_eevee)
+        return cls(
+            surfaces,
+            wanted,
+            all_light / 4,
+            ground,
+            standing,
+            part,
+            of_residual,
+            BALANCED * part,
+            in_eevee,
+        )
+
+    def expected(self, error_of_cuts: float) -> float:
+        """How wrong suns are, about, by what is wrong of their cells when these are cut."""
+        return hypot(self.of_cuts * error_of_cuts, self.of_residual)
 
     def error(self, suns: Sequence[Sun]) -> float:
         """Root mean square of what surfaces get wrong under shadows if these suns stand in for
         the light, as a part of the mean irradiance in the open."""
-        parts = np.ones(len(suns))
+        lights = [(self.surfaces, np.ones(len(suns)))]
         if self.in_eevee:
             parts = part_shadowed(np.array([sun.angular_diameter for sun in suns]))
+            lights = [(self.surfaces, parts), (self.surfaces.in_the_open(), 1 - parts)]
         wrong = -self.irradiance
-        for surfaces, lit in (
-            (self.surfaces, parts),
-            (self.surfaces.in_the_open(), 1 - parts),
-        ):
+        for surfaces, lit in lights:
             given = [(sun, part) for sun, part in zip(suns, lit, strict=True) if part > 0]
             if given:
                 wrong = wrong + surfaces.irradiance(*_pieces(*zip(*given, strict=True)))

@@ -68,8 +68,6 @@ class ConversionSettings:
         as few as shadows and rough surfaces need, see `lighting_width`, or None: about 1,024;
         mirrors and backgrounds may show that it is not sharp.
     residual_samples: how many samples a Voronoi map is made of.
-    leniency: of the error that the program allows by itself, so much is allowed: less where what
-        is lit gets so little of the light that what is wrong of it shows.
     mirrors: whether something may show the residual sharply. Where nothing does, suns in EEVEE may
         hold all light, as what is left would be without shadows.
     fill: what the residual shows in region A: its "surroundings", with only what exceeds them
@@ -91,7 +89,6 @@ class ConversionSettings:
     residual: ResidualKind = "map"
     residual_width: ResidualWidth = None
     residual_samples: int = 500
-    leniency: float = 1.0
     mirrors: bool = True
     fill: Fill | None = None
 
@@ -102,8 +99,6 @@ class ConversionSettings:
                 raise BadSetting(f"{name} must be 1 to {most:,}, not {value:,}.")
         if self.tolerance is not None and not 0 < self.tolerance <= 100:
             raise BadSetting(f"tolerance must be above 0 and at most 100, not {self.tolerance:g}.")
-        if not 0 < self.leniency <= 1:
-            raise BadSetting(f"leniency must be above 0 and at most 1, not {self.leniency:g}.")
         if self.share is not None and not 0 <= self.share <= 1:
             raise BadSetting(f"share must be 0 to 1, not {self.share:g}.")
         if self.strata < 2 or self.strata % 2:
@@ -153,21 +148,14 @@ class ConversionSettings:
     @property
     def tolerated(self) -> float:
         """The tolerance in percent, with None resolved: see `allowed_error`."""
-        if self.tolerance is not None:
-            return self.tolerance
-        return TOLERANCE * self.leniency if self.tightens else TOLERANCE
+        return TOLERANCE if self.tolerance is None else self.tolerance
 
     def allowed_error(self, share: float) -> float | None:
         """The tolerance in percent for suns with this share of all light, with None resolved; None
         still where as many lights as asked for are wanted."""
         if self.lights is None and self.tolerance is None:
-            return min(self.tolerated, 100 * OF_OWN_LIGHT * share * self.leniency)
+            return min(TOLERANCE, 100 * OF_OWN_LIGHT * share)
         return self.tolerance
-
-    @property
-    def tightens(self) -> bool:
-        """Whether the program allows itself less than usual."""
-        return self.leniency < 1 and self.lights is None and self.tolerance is None
 
     def as_dict(self) -> dict[str, object]:
         return asdict(self)

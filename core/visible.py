@@ -7,7 +7,7 @@ region A leaves it out.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from . import sphere
 from .environment import EnvironmentMap
+from .indoors import Indoors
 
 ROWS = 18
 """Of cells, from pole to pole."""
@@ -45,15 +46,21 @@ _SIZE = 2 * ROWS, ROWS
 class VisiblePart:
     """cells: whether light from there may reach something, bool (ROWS, 2 ROWS), rows downwards.
     through: where it is looked for through openings, the part of the half sphere above a place
-    that these take."""
+    that these take. indoors: places that light reaches through openings only, if there are any."""
 
     cells: NDArray[np.bool_]
     through: float | None = None
+    indoors: Indoors | None = None
 
     @cached_property
     def key(self) -> tuple[bytes, float | None]:
-        """The same for the same part."""
+        """The same for the same part of the map."""
         return self.cells.tobytes(), self.through
+
+    @cached_property
+    def whole_key(self) -> tuple[Hashable, ...]:
+        """The same where it is the same to the same places, too."""
+        return *self.key, self.indoors and self.indoors.key
 
     def pixels(self, width: int, height: int) -> NDArray[np.bool_]:
         """Which pixels of a map of this size are visible, (height, width)."""
@@ -79,10 +86,13 @@ class Looks:
     reaches: Callable[[NDArray[np.float64], int], bool]
 
 
-def through_openings(visible: VisiblePart | None, part: float) -> VisiblePart:
-    """The same, or all of a map, through openings."""
+def to_indoors(
+    visible: VisiblePart | None, indoors: Indoors, through: float | None = None
+) -> VisiblePart:
+    """The same, or all of a map, to places that light reaches through openings only. through:
+    where it is looked for through these, see `VisiblePart`."""
     cells = visible.cells if visible else np.ones((ROWS, 2 * ROWS), bool)
-    return VisiblePart(cells, part)
+    return VisiblePart(cells, through, indoors)
 
 
 def visible_part(environment: EnvironmentMap, looks: Looks) -> VisiblePart | None:
@@ -109,7 +119,7 @@ def visible_part(environment: EnvironmentMap, looks: Looks) -> VisiblePart | Non
 def _hidden(environment: EnvironmentMap, cells: NDArray[np.intp], looks: Looks) -> NDArray[np.intp]:
     """Those of some cells, far from where light was found to come from, that are bright and proven
     to reach nothing: not so bright that to find nothing proves nothing."""
-    light = environment.once("light of cells", lambda: _light_of_cells(environment))
+    light = light_of_cells(environment)
     size = np.repeat(sphere.row_solid_angles(*_SIZE), 2 * ROWS)
     met = (light / size)[sphere.pixels_at(looks.escaped, *_SIZE)]
     reaching = 2 * np.pi * met.sum() / looks.count
@@ -122,6 +132,11 @@ def _hidden(environment: EnvironmentMap, cells: NDArray[np.intp], looks: Looks) 
     for k in np.flatnonzero(proven):
         proven[k] = not looks.reaches(_brightest(environment, int(bright[k])), int(trials[k]))
     return bright[proven]
+
+
+def light_of_cells(environment: EnvironmentMap) -> NDArray[np.float64]:
+    """Luminance of the scalar irradiance from each cell of a map, (ROWS * 2 ROWS,)."""
+    return environment.once("light of cells", lambda: _light_of_cells(environment))
 
 
 def _light_of_cells(environment: EnvironmentMap) -> NDArray[np.float64]:

@@ -8,6 +8,7 @@ from math import hypot
 
 import numpy as np
 
+from ..indoors import Indoors
 from ..patches import MOST_PATCHES, Patches, patches_of
 from ..prediction import Prediction
 from ..region import RegionLight
@@ -19,9 +20,6 @@ from .level import Level, levelled
 from .light_count import fewest, first_guess
 from .placement import NO_SUN, ON_GROUND, ON_WALLS, ChosenSuns
 from .sampled import sampled_suns
-
-BALANCED = 1.6
-"""What is predicted of lights, about, against what is wrong of their cells when these are cut."""
 
 PER_LIGHT, FEWEST_PATCHES = 128, 2048
 """As many lights as were asked for are made of so many patches. 2 to 64 of them for nine maps are
@@ -48,10 +46,12 @@ def choose_suns(
     strata: Strata,
     settings: ConversionSettings,
     unshadowed: RegionLight | None = None,
+    indoors: Indoors | None = None,
 ) -> ChosenSuns:
     """Suns that hold all of the light, and what shadows are predicted to be wrong by.
 
-    unshadowed: the rest of the map, where the target shows it without shadows.
+    unshadowed: the rest of the map, where the target shows it without shadows. indoors: the places
+    that the light reaches, where it does so through openings only.
     """
     light = light.lit
     rest = patches_of(unshadowed, unshadowed.luminous_flux) if unshadowed else None
@@ -60,11 +60,14 @@ def choose_suns(
         error = Prediction.of(None, strata.light, rest, eevee).error(()) if rest else 0.0
         return ChosenSuns((), error, (NO_SUN,) if settings.share is None else (), 0.0)
     patches = _patches(light, strata, TOLD_BY)
-    prediction = light.latest(
-        "prediction",
-        (strata, rest, eevee),
-        lambda: Prediction.of(patches, strata.light, rest, eevee),
-    )
+
+    def predict() -> Prediction:
+        if indoors is not None:
+            return Prediction.indoors(patches, strata.light, indoors)
+        return Prediction.of(patches, strata.light, rest, eevee)
+
+    told_for = strata, rest, eevee, indoors and indoors.key
+    prediction = light.latest("prediction", told_for, predict)
     allowed = settings.allowed_error(float(light.luminous_flux.sum()) / strata.light)
     if allowed is not None and settings.tolerance is None:
         allowed = hypot(allowed, 100 * prediction.of_residual)
@@ -117,11 +120,10 @@ def _fewest_by_edge(
     """
     eevee = settings.in_eevee
     few = split_of(_patches(light, strata, FEWEST_SEARCHED), settings.shape, eevee)
-    share = float(light.luminous_flux.sum()) / strata.light
 
     @cache
     def expected(count: int) -> float:
-        return hypot(BALANCED * few.error_of_cuts(count) * share, prediction.of_residual)
+        return prediction.expected(few.error_of_cuts(count))
 
     likely = first_guess(allowed, settings.most_lights, expected)
 

@@ -82,7 +82,7 @@ def test_every_setting_of_the_core_is_a_choice_with_the_same_default(scene):
 
     own = {name: getattr(scene.sunsplit, name) for name in CHOICES}
     assert settings_for(own, "CYCLES") == ConversionSettings()
-    found_out = {"leniency", "mirrors"}  # by a look at the scene
+    found_out = {"mirrors"}  # by a look at the scene
     assert {*CHOICES, *found_out} == {
         *asdict(ConversionSettings()),
         "share_auto",

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from sunsplit.addon import fitted, known
-from sunsplit.addon.fitted import IN_CLOSED
+from sunsplit.addon import known
 from sunsplit.addon.restoring import restore_scene
 from sunsplit.addon.scene import convert_scene
 from sunsplit.core.settings import ConversionSettings
@@ -180,13 +179,13 @@ def no_front(scene):
         bpy.data.objects.remove(thing)
 
 
-def test_a_missing_wall_gets_a_portal_and_lamps_as_in_the_open(scene):
+def test_a_missing_wall_gets_a_portal_too(scene):
     no_front(scene)
     bpy.context.view_layer.update()
     found = convert_scene(scene, ConversionSettings()).conversion
     (portal,) = portals(scene)
     assert portal.data.size * portal.data.size_y == pytest.approx(4 * 2.6, rel=0.1)
-    assert found.settings.leniency == 1
+    assert found.is_indoors
 
 
 def eevee(scene):
@@ -200,7 +199,7 @@ def test_none_are_made_where_they_would_not_help(scene, change):
     theirs = portals(scene)
     bpy.ops.sunsplit.convert()
     assert portals(scene) == theirs
-    assert "opening" not in scene.sunsplit.report
+    assert "portal" not in scene.sunsplit.report
 
 
 def test_none_are_made_where_nothing_is_to_be_skipped(scene):
@@ -253,49 +252,48 @@ def test_the_light_tree_stays_in_a_room_with_lamps_of_its_own(even):
     assert even.cycles.use_light_tree
 
 
-def test_lamps_of_a_closed_scene_are_truer_whoever_makes_portals(sunrise):
-    for change in (no_roof, None, users_portal):
+def test_lamps_of_a_closed_scene_are_judged_where_light_comes_in(sunrise):
+    """Whoever makes portals, and whatever part of the light is asked for."""
+    cases = ((no_roof, {}), (None, {}), (users_portal, {}), (None, {"share": 0.7}))
+    for change, chosen in cases:
         scene = room(sunrise)
         if change:
             change(scene)
         bpy.context.view_layer.update()
         known.forget()
-        found = convert_scene(scene, ConversionSettings()).conversion
+        found = convert_scene(scene, ConversionSettings(**chosen)).conversion
         is_closed = change is not no_roof
-        assert (found.settings.leniency < 1) == is_closed
-        assert ("In a closed scene" in scene.sunsplit.report) == is_closed
-        if is_closed:
-            assert found.predicted_error <= IN_CLOSED / 100
-        else:
-            assert found.predicted_error > IN_CLOSED / 100
-        restore_scene(scene)
-    found = convert_scene(scene, ConversionSettings(lights=2)).conversion
-    assert len(found.suns) <= 2
-    assert "In a closed scene" not in scene.sunsplit.report
+        assert found.is_indoors == is_closed
+        assert ("where light comes in" in scene.sunsplit.report) == is_closed
+        assert ("level ground" in scene.sunsplit.report) != is_closed
+        assert found.predicted_error <= 0.01
 
 
-def test_lamps_before_a_portal_are_truer_still_if_they_are_few(scene, monkeypatch):
-    for few, leniency in ((fitted.FEW, fitted.STRICT), (0, IN_CLOSED)):
-        monkeypatch.setattr(fitted, "FEW", few)
-        known.forget()
-        found = convert_scene(scene, ConversionSettings()).conversion
-        assert portals(scene)
-        assert found.suns
-        assert found.settings.leniency == leniency
-        assert found.predicted_error <= leniency / 100
-        restore_scene(scene)
+def test_lamps_are_chosen_anew_for_another_window(sunrise):
+    scene = room(sunrise)
+    first = convert_scene(scene, ConversionSettings()).conversion
+    for thing in scene.objects:
+        if thing.type == "MESH":
+            thing.matrix_world = Matrix.Rotation(0.3, 4, "Z") @ thing.matrix_world
+    bpy.context.view_layer.update()
+    second = convert_scene(scene, ConversionSettings()).conversion
+    assert second.is_indoors
+    assert second.visible.indoors.key != first.visible.indoors.key
+    assert second is not first
 
 
-def test_where_truer_lamps_do_not_pay_usual_ones_may(scene, monkeypatch):
-    for answers, leniency in (((False, True), IN_CLOSED), ((False, False), IN_CLOSED)):
-        said = iter(answers)
-        monkeypatch.setattr(fitted, "openings_pay", lambda *_, said=said: next(said))
-        known.forget()
-        found = convert_scene(scene, ConversionSettings()).conversion
-        assert bool(portals(scene)) == answers[-1]
-        assert found.settings.leniency == leniency
-        assert next(said, None) is None
-        restore_scene(scene)
+def test_a_turned_map_lights_the_same_places(sunrise):
+    """What is told of openings is in the map's axes."""
+    scene = room(sunrise)
+    bpy.ops.sunsplit.convert()
+    before = convert_scene(scene, ConversionSettings()).conversion.visible.indoors
+    mapping = next(n for n in scene.world.node_tree.nodes if n.type == "MAPPING")
+    mapping.inputs["Rotation"].default_value = (0, 0, 0.4)
+    after = convert_scene(scene, ConversionSettings()).conversion.visible.indoors
+    # The map is looked up 0.4 further on: what stands in the scene turns so in its axes.
+    turn = np.array(Matrix.Rotation(0.4, 3, "Z"))
+    assert after.places == pytest.approx(before.places @ turn.T, abs=1e-5)
+    assert after.openings[0].inwards == pytest.approx(turn @ before.openings[0].inwards, abs=1e-5)
 
 
 def test_a_ground_under_the_sky_has_no_openings(overcast):

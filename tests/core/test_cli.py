@@ -116,7 +116,6 @@ def test_json_is_one_object_and_nothing_else(sky_file, out, capfd):
         "residual_width": None,
         "residual_samples": 500,
         "fill": "surroundings",
-        "leniency": 1.0,
         "mirrors": True,
         "threshold": 0,
     }

@@ -110,19 +110,6 @@ def test_what_level_ground_gets_wrong(sunrise, lights):
     assert conversion.ground_error == pytest.approx(expected, rel=0.2, abs=3e-4)
 
 
-@pytest.mark.parametrize("share", [0.01, 0.9])
-def test_the_program_allows_itself_less_where_it_must_be_strict(share):
-    usual, strict = ConversionSettings(), ConversionSettings(leniency=0.3)
-    assert strict.allowed_error(share) == pytest.approx(0.3 * usual.allowed_error(share))
-    assert strict.tightens
-    assert not usual.tightens
-    for chosen in ({"tolerance": 2.0}, {"lights": 3}, {"lights": 3, "tolerance": 2.0}):
-        asked = ConversionSettings(leniency=0.3, **chosen)
-        assert asked.allowed_error(share) == ConversionSettings(**chosen).allowed_error(share)
-        assert asked.tolerated == ConversionSettings(**chosen).tolerated
-        assert not asked.tightens
-
-
 def test_other_methods_have_a_tolerance_too(sunrise):
     chosen = ConversionSettings(share=1, method="median-cut", tolerance=5)
     conversion = convert(load(sunrise), chosen)
