@@ -81,11 +81,14 @@ def fitted_conversion(
         conversion = yield convert(visible)
         return Fitted(conversion, tree_pays(conversion))
     indoors = closed.indoors(environment, light.map_from_world)
+    # Where the user has made portals, or no light is left for any, there is nothing to decide.
+    by_users = has_portals(scene)
+    if by_users or not settings.leaves_residual:
+        through = closed.part if by_users else None
+        conversion = yield convert(to_indoors(visible, indoors, through))
+        return Fitted(conversion, tree_pays(conversion))
     untold = yield convert(to_indoors(visible, indoors))
     without = Fitted(untold, tree_pays(untold))
-    # Where the user has made portals, or no light is left for any, there is nothing to decide.
-    if has_portals(scene) or not settings.leaves_residual:
-        return without
     told = yield convert(to_indoors(visible, indoors, closed.part))
     by_portals = Fitted(told, by_tree=True, openings=closed.openings)
     outside = yield from closed.light(untold, light.map_from_world)

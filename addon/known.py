@@ -24,8 +24,8 @@ MOST_BYTES = 2**28
 """Of pixels in memory: a map of more, 8k and up, is not kept. Of a file only what it was narrowed
 to is held anyway."""
 
-CONVERSIONS = 3
-"""Of a map are kept: of a scene with openings up to three are asked for in turn."""
+CONVERSIONS = 2
+"""Of a map are kept: of a scene with openings two are asked for in turn."""
 
 _BLOCK = 2**16
 """Numbers that are summed into one by a fingerprint."""
