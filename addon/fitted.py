@@ -26,7 +26,6 @@ from .world import WorldLight, is_animated
 MADE = 0.9
 """Of the time of a conversion, about, until its maps are written."""
 
-
 WIDE = 0.18
 """Openings that need no portals, though `core.openings` may still find them. In a missing wall,
 which takes .13, they pay where they are predicted to; in a missing roof, which takes .23, they
@@ -80,19 +79,21 @@ def fitted_conversion(
     if closed is None:
         conversion = yield convert(visible)
         return Fitted(conversion, tree_pays(conversion))
-    indoors = closed.indoors(environment, light.map_from_world)
+    # Where the world is animated, light that comes in now may not, and what does not may.
+    moves, to_map = is_animated(light, ()), light.map_from_world
+    indoors = None if moves else closed.indoors(environment, visible, to_map)
+    through = closed.part if settings.chooses_border else None
     # Where the user has made portals, or no light is left for any, there is nothing to decide.
     by_users = has_portals(scene)
     if by_users or not settings.leaves_residual:
-        through = closed.part if by_users else None
-        conversion = yield convert(to_indoors(visible, indoors, through))
+        conversion = yield convert(to_indoors(visible, indoors, through if by_users else None))
         return Fitted(conversion, tree_pays(conversion))
     untold = yield convert(to_indoors(visible, indoors))
     without = Fitted(untold, tree_pays(untold))
-    told = yield convert(to_indoors(visible, indoors, closed.part))
+    told = yield convert(to_indoors(visible, indoors, through))
     by_portals = Fitted(told, by_tree=True, openings=closed.openings)
-    outside = yield from closed.light(untold, light.map_from_world)
-    inside = yield from closed.light(told, light.map_from_world)
+    outside = yield from closed.light(untold, to_map)
+    inside = yield from closed.light(told, to_map)
     return _calmer(by_portals, inside, without, outside, needs)
 
 

@@ -16,10 +16,18 @@ from ..core import sphere
 from ..core.conversion import Conversion
 from ..core.environment import LUMINANCE_WEIGHTS, EnvironmentMap, luminance
 from ..core.indoors import Indoors
-from ..core.openings import WIDEST, Inside, Opening, find_openings, may_be_closed, part_seen
+from ..core.openings import (
+    WIDEST,
+    Inside,
+    Opening,
+    are_inside,
+    find_openings,
+    may_be_closed,
+    part_seen,
+)
 from ..core.portal_noise import LightInside, square_through
 from ..core.sums import weighted_sum
-from ..core.visible import light_of_cells
+from ..core.visible import VisiblePart, light_of_cells
 from .images import READ
 from .lamps import remove_lamps, unlink_lamps
 from .rays import LOOKS, Reach
@@ -66,8 +74,7 @@ class ClosedScene:
     @cached_property
     def within(self) -> NDArray[np.intp]:
         """The places that are inside."""
-        before = [opening.is_before(self.inside.places) for opening in self.openings]
-        return np.flatnonzero(np.any(before, axis=0))
+        return np.flatnonzero(are_inside(self.inside, self.openings))
 
     @cached_property
     def normals(self) -> NDArray[np.float64]:
@@ -79,14 +86,20 @@ class ClosedScene:
         count = len(self.within)
         return self.within[np.linspace(0, count, min(most, count), endpoint=False).astype(int)]
 
-    def indoors(self, environment: EnvironmentMap, to_map: NDArray[np.float64]) -> Indoors:
-        """What a map's light may reach. to_map: rotation (3, 3) from the scene's axes."""
+    def indoors(
+        self,
+        environment: EnvironmentMap,
+        visible: VisiblePart | None,
+        to_map: NDArray[np.float64],
+    ) -> Indoors:
+        """What a map's light may reach. visible: of the map, None for all. to_map: rotation (3, 3)
+        from the scene's axes."""
         places = self.some_within(MOST_LIT)
         return Indoors(
             self.inside.places[places] @ to_map.T,
             self.normals[places] @ to_map.T,
             tuple(opening.turned(to_map) for opening in self.openings),
-            light_of_cells(environment),
+            light_of_cells(environment, visible),
         )
 
     def light(self, conversion: Conversion, to_map: NDArray[np.float64]) -> Steps[LightInside]:

@@ -50,7 +50,7 @@ CHOICES = {
     "tolerance": FloatProperty(
         name="Tolerance",
         description="How wrong shadows may be by prediction, in percent of the mean light: more "
-        f"lamps are not made. 0: {TOLERANCE:g} % where Lights is 0 (less in rooms), else none",
+        f"lamps are not made. 0: {TOLERANCE:g} % where Lights is 0, else none",
         default=0.0,
         options=_FRESH,
         min=0.0,

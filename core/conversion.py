@@ -35,8 +35,8 @@ class Conversion:
     `placement.ChosenSuns.standing_error` for walls. ground_error:
     what level ground in the open gets wrong of the worst channel, as a part of its irradiance; 0
     where it is indoors.
-    visible: what suns were chosen from, where that is not the whole map. notes: plain sentences
-    for the user.
+    visible: what suns were chosen from, where that is not the whole map, or indoors. notes: plain
+    sentences for the user.
     """
 
     environment: EnvironmentMap
@@ -88,7 +88,8 @@ def convert(
     """Split a map into suns (region A) and a residual map (region B).
 
     visible: what of the map reaches what is looked at, where that is known: what does not stays in
-    the residual, unless the share or the target asks for all of the map.
+    the residual, unless the share or the target asks for all of the map. Places indoors count
+    where a share is given, too.
     """
     settings = settings or ConversionSettings()
     visible = _what_counts(visible, settings)

@@ -35,8 +35,8 @@ memory."""
 class Indoors:
     """places: that matter, (p, 3), with normals, (p, 3). openings: rectangles that the light of a
     map comes in through; nothing is thought to stand between. All in the axes of the map. light:
-    luminance of the map's scalar irradiance from each cell of an equirectangular grid of twice as
-    many columns as rows, (cells,)."""
+    luminance of the scalar irradiance, of what of the map may come in, from each cell of an
+    equirectangular grid of twice as many columns as rows, (cells,)."""
 
     places: Floats
     normals: Floats
@@ -45,8 +45,8 @@ class Indoors:
 
     @cached_property
     def key(self) -> bytes:
-        """The same for the same places and openings."""
-        numbers = [self.places, self.normals]
+        """The same for the same places, openings and light."""
+        numbers = [self.places, self.normals, self.light]
         numbers += [
             np.array([*one.centre, *one.across, *one.inwards, one.width, one.height])
             for one in self.openings
@@ -83,7 +83,10 @@ class Indoors:
         given = np.maximum(self.normals[before] @ directions.T, 0)
         for axis, side in ((opening.across, opening.width), (opening.up, opening.height)):
             at = (from_centre @ axis)[:, None] + along * (directions @ axis)
-            given *= np.clip((side / 2 - np.abs(at)) / np.maximum(blur, SOFT * side) + 0.5, 0, 1)
+            soft = np.maximum(blur, SOFT * side)
+            # Of a piece wider than the opening no more comes in than it has room for.
+            most = np.minimum(side / soft, 1)
+            given *= np.clip((side / 2 - np.abs(at)) / soft + 0.5, 0, most)
         return given @ flux
 
     def mean_irradiance(self, directions: Floats, flux: Floats, irradiance: Floats) -> float:

@@ -173,6 +173,11 @@ def may_be_closed(escaped: int, looks: int) -> bool:
     return FEWEST <= escaped <= looks * (1 - INSIDE + INSIDE * WIDEST)
 
 
+def are_inside(inside: Inside, found: Sequence[Opening]) -> NDArray[np.bool_]:
+    """Which places are inside of openings, (p,)."""
+    return _from_inside(inside, found)[1]
+
+
 def part_seen(inside: Inside, found: Sequence[Opening]) -> float:
     """Of the half sphere above a place inside, what openings take on average."""
     through, within = _from_inside(inside, found)

@@ -52,6 +52,10 @@ it is right to 1e-4, mostly far better, where predictions are good to a tenth.""
 SHARP = 1e-7
 """Half the width of a point, radians."""
 
+DARKEST = 1e-3
+"""Of the mean irradiance in the open, and of what falls in: a room that gets less light is dark
+whatever is wrong of it."""
+
 BALANCED, BALANCED_INDOORS = 1.6, 25.0
 """What is predicted of lights, about, against what is wrong of their cells when these are cut:
 guesses to begin with. Indoors it is a part of what falls in directly."""
@@ -133,13 +137,14 @@ class Prediction:
 
     irradiance: of each surface, luminance, (s,). mean: what surfaces get in the open from the
     whole map, on average over all that they may face; indoors what a picture shows on average.
-    ground: what level ground gets in the open,
-    as a part of the light that suns replace, of each channel; nan where a channel has none, (3,).
+    ground: what level ground gets in the open, as a part of the light that suns replace, of each
+    channel; nan where a channel has none, (3,).
     standing: what walls on level ground get, as parts of the luminous light that suns replace,
     (WALLS,); None where the ground does not hide all light below the horizon, as in EEVEE.
-    part: of all light that suns replace. of_residual: what the rest of the light is wrong by, where
-    it is shown without its shadows, as `error` counts: no suns mend that. of_cuts: how wrong suns
-    are, about, against what is wrong of their cells when these are cut. in_eevee: see `two_orders`.
+    part: of all light that suns replace; part_inside: indoors, of what falls in. of_residual: what
+    the rest of the light is wrong by, where it is shown without its shadows, as `error` counts: no
+    suns mend that. of_cuts: how wrong suns are, about, against what is wrong of their cells when
+    these are cut. in_eevee: see `two_orders`.
     """
 
     surfaces: Surfaces | Indoors
@@ -151,6 +156,7 @@ class Prediction:
     of_residual: float = 0.0
     of_cuts: float = 0.0
     in_eevee: bool = False
+    part_inside: float = 0.0
 
     @classmethod
     def indoors(cls, patches: Patches, all_light: float, indoors: Indoors) -> Prediction:
@@ -158,10 +164,20 @@ class Prediction:
         what is there. patches, all_light: see `of`."""
         flux = patches.flux @ LUMINANCE_WEIGHTS
         wanted = _lit(indoors, patches)
-        direct = indoors.mean_irradiance(patches.directions, flux, wanted)
-        mean, part = max(BOUNCED * direct, 1e-300), float(flux.sum()) / all_light
-        of_cuts = BALANCED_INDOORS * float(np.mean(wanted)) / mean
-        return cls(indoors, wanted, mean, np.full(3, np.nan), None, part, of_cuts=of_cuts)
+        least = DARKEST * all_light / (4 * BOUNCED)
+        direct = max(indoors.mean_irradiance(patches.directions, flux, wanted), least)
+        part, inside = float(flux.sum()) / all_light, float(np.mean(wanted)) / direct
+        of_cuts = BALANCED_INDOORS * max(inside, DARKEST) / BOUNCED
+        return cls(
+            indoors,
+            wanted,
+            BOUNCED * direct,
+            np.full(3, np.nan),
+            None,
+            part,
+            of_cuts=of_cuts,
+            part_inside=inside,
+        )
 
     @classmethod
     def of(
@@ -217,7 +233,7 @@ class Prediction:
 
     def error(self, suns: Sequence[Sun]) -> float:
         """Root mean square of what surfaces get wrong under shadows if these suns stand in for
-        the light, as a part of the mean irradiance in the open."""
+        the light, as a part of `mean`."""
         lights = [(self.surfaces, np.ones(len(suns)))]
         if self.in_eevee:
             parts = part_shadowed(np.array([sun.angular_diameter for sun in suns]))

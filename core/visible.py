@@ -87,10 +87,10 @@ class Looks:
 
 
 def to_indoors(
-    visible: VisiblePart | None, indoors: Indoors, through: float | None = None
+    visible: VisiblePart | None, indoors: Indoors | None, through: float | None = None
 ) -> VisiblePart:
-    """The same, or all of a map, to places that light reaches through openings only. through:
-    where it is looked for through these, see `VisiblePart`."""
+    """The same, or all of a map, to places that light reaches through openings only, if they are
+    known. through: where it is looked for through these, see `VisiblePart`."""
     cells = visible.cells if visible else np.ones((ROWS, 2 * ROWS), bool)
     return VisiblePart(cells, through, indoors)
 
@@ -134,9 +134,13 @@ def _hidden(environment: EnvironmentMap, cells: NDArray[np.intp], looks: Looks) 
     return bright[proven]
 
 
-def light_of_cells(environment: EnvironmentMap) -> NDArray[np.float64]:
-    """Luminance of the scalar irradiance from each cell of a map, (ROWS * 2 ROWS,)."""
-    return environment.once("light of cells", lambda: _light_of_cells(environment))
+def light_of_cells(
+    environment: EnvironmentMap, visible: VisiblePart | None = None
+) -> NDArray[np.float64]:
+    """Luminance of the scalar irradiance from each cell of a map, or of what is visible of it,
+    (ROWS * 2 ROWS,)."""
+    light = environment.once("light of cells", lambda: _light_of_cells(environment))
+    return light * visible.cells.ravel() if visible else light
 
 
 def _light_of_cells(environment: EnvironmentMap) -> NDArray[np.float64]:

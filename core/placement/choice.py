@@ -36,6 +36,9 @@ TOLD_BY = 4096
 """Patches by which errors are predicted: as far from what many more tell as MOST_PATCHES are, as
 both are good to a tenth only."""
 
+MOST_INDOORS = 64
+"""By itself: where little of a light grazes a window, all that comes in of it is an edge."""
+
 TILTS_COST = 0.65, 2.6
 """See `level.levelled`: the median of 191 sets of suns under eight maps, and what nine in ten of
 them do not exceed. That is tried where shadows of tilted discs are more wrong than was thought."""
@@ -68,7 +71,7 @@ def choose_suns(
 
     told_for = strata, rest, eevee, indoors and indoors.key
     prediction = light.latest("prediction", told_for, predict)
-    allowed = settings.allowed_error(float(light.luminous_flux.sum()) / strata.light)
+    allowed = settings.allowed_error(max(prediction.part, prediction.part_inside))
     if allowed is not None and settings.tolerance is None:
         allowed = hypot(allowed, 100 * prediction.of_residual)
     if settings.method != "edge":
@@ -125,7 +128,10 @@ def _fewest_by_edge(
     def expected(count: int) -> float:
         return prediction.expected(few.error_of_cuts(count))
 
-    likely = first_guess(allowed, settings.most_lights, expected)
+    most = settings.most_lights
+    if settings.lights is None and isinstance(prediction.surfaces, Indoors):
+        most = min(most, MOST_INDOORS)
+    likely = first_guess(allowed, most, expected)
 
     @cache
     def of_cells(count: int, rough: bool) -> ChosenSuns:
@@ -136,7 +142,7 @@ def _fewest_by_edge(
         return _levelled(_judged(chosen, prediction, strata), prediction, strata, allowed)
 
     quickly, with_care = (partial(of_cells, rough=rough) for rough in (True, False))
-    found = fewest(quickly, allowed, settings.most_lights, expected, with_care)
+    found = fewest(quickly, allowed, most, expected, with_care)
     return min(found, with_care(len(found.suns)), key=lambda one: one.worst)
 
 

@@ -283,6 +283,17 @@ def test_lamps_are_chosen_anew_for_another_window(sunrise):
     assert second is not first
 
 
+def test_where_the_map_turns_by_itself_lamps_are_made_for_all_that_may_come_in(scene):
+    bpy.ops.sunsplit.convert()
+    mapping = next(n for n in scene.world.node_tree.nodes if n.type == "MAPPING")
+    mapping.inputs["Rotation"].keyframe_insert("default_value", index=2, frame=1)
+    mapping.inputs["Rotation"].default_value[2] = 3.0
+    mapping.inputs["Rotation"].keyframe_insert("default_value", index=2, frame=50)
+    found = convert_scene(scene, ConversionSettings()).conversion
+    assert found.suns
+    assert not found.is_indoors
+
+
 def test_a_turned_map_lights_the_same_places(sunrise):
     """What is told of openings is in the map's axes."""
     scene = room(sunrise)

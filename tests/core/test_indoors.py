@@ -7,16 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sunsplit.core import sphere
 from sunsplit.core.conversion import convert
 from sunsplit.core.environment import luminance
 from sunsplit.core.indoors import BOUNCED, Indoors
 from sunsplit.core.openings import Opening
 from sunsplit.core.patches import patches_of
+from sunsplit.core.placement.choice import MOST_INDOORS
 from sunsplit.core.prediction import Prediction
 from sunsplit.core.region import light_of_map
 from sunsplit.core.settings import ConversionSettings
 from sunsplit.core.tolerances import ACCOUNT
-from sunsplit.core.visible import light_of_cells, to_indoors
+from sunsplit.core.visible import ROWS, VisiblePart, light_of_cells, to_indoors
 from tests.maps import direction, environment, paint_disc, sky
 
 X, Y, Z = np.eye(3)
@@ -82,6 +84,15 @@ def test_a_wide_piece_of_light_blurs_the_edges_as_wide_as_it_is():
     disc = crossing(indoors, in_disc(centre, width, 2000, seed=5))
     assert one.mean() == pytest.approx(disc.mean(), rel=0.05)
     assert np.sqrt(np.mean((one - disc) ** 2)) < 0.06 * disc.max()
+
+
+def test_of_light_wider_than_the_opening_no_more_comes_in_than_has_room():
+    slit = Opening(np.array([2.0, 0, 1.4]), Y, Z, -X, 0.2, 0.3)
+    indoors = floor(40, (slit,))
+    centre, width = direction(0, 40), np.radians(12)
+    one = indoors.irradiance(centre[None], np.ones(1), np.array([width / 2]))
+    disc = crossing(indoors, in_disc(centre, width, 4000, seed=5))
+    assert one.mean() == pytest.approx(disc.mean(), rel=0.3)  # a square's corners, and a slope
 
 
 def test_light_from_behind_or_beside_does_not_come_in():
@@ -167,6 +178,35 @@ def test_a_light_that_does_not_come_in_takes_no_more_than_one_sun():
     indoors = floor(16, (behind,), light_of_cells(found))
     conversion = convert(found, visible=to_indoors(None, indoors))
     assert len(conversion.suns) <= 1
+
+
+def test_a_sun_between_two_lights_that_do_not_come_in_is_no_wild_error():
+    pixels = sky(256, 0.0)
+    for azimuth in (100, -100):
+        paint_disc(pixels, direction(azimuth, 20), 3, (50, 50, 50))
+    found = environment(pixels)
+    visible = to_indoors(None, floor(12, light=light_of_cells(found)))
+    conversion = convert(found, ConversionSettings(lights=1), visible=visible)
+    assert len(conversion.suns) == 1
+    assert conversion.predicted_error < 10
+    assert len(convert(found, visible=visible).suns) <= MOST_INDOORS
+
+
+def test_a_light_that_is_known_not_to_reach_the_window_makes_none_bright():
+    """A sun in the window's direction, but behind the house opposite."""
+    pixels = odd_light().radiance.copy()
+    paint_disc(pixels, direction(45, 15), 2, (30_000, 30_000, 30_000))
+    found = environment(pixels)
+    cells = np.ones((ROWS, 2 * ROWS), bool)
+    cells.ravel()[sphere.pixels_at(direction(45, 15)[None], 2 * ROWS, ROWS)] = False
+    visible = VisiblePart(cells)
+    counts = []
+    for counted in (None, visible):
+        indoors = floor(16, light=light_of_cells(found, counted))
+        suns = convert(found, visible=to_indoors(visible, indoors)).suns
+        counts.append(len(suns))
+    assert counts[0] < counts[1]
+    assert 4 <= counts[1] < 20
 
 
 @pytest.mark.parametrize("chosen", [{"share": 0.5}, {"lights": 3}, {"tolerance": 4.0}])

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from sunsplit.core.openings import Inside, Opening, find_openings, part_seen
+from sunsplit.core.openings import Inside, Opening, are_inside, find_openings, part_seen
 from sunsplit.core.portal_noise import (
     LightInside,
     mean_square_told,
@@ -268,6 +268,17 @@ def test_the_part_that_a_window_takes_of_the_half_sphere():
     inside = look_around([WINDOW], count=4000)
     part = part_seen(inside, find_openings(inside))
     assert part == pytest.approx(len(inside.escaped) / (LOOKS * 4000), rel=0.03)
+
+
+def test_what_lies_before_one_opening_may_be_behind_another():
+    x, y, z = np.eye(3)
+    east = Opening(np.array([2, 0, 1.5]), y, z, -x, 1.0, 1.0)
+    west = Opening(np.array([-2, 0, 1.5]), y, z, x, 1.0, 1.0)
+    places = np.array([[0, 0, 1.0], [5, 0, 1], [-5, 0, 1]])
+    nothing = np.empty((0, 3))
+    inside = Inside(places, 3, nothing, np.empty(0, np.intp), nothing, nothing, None)
+    assert are_inside(inside, [east]).tolist() == [True, False, True]
+    assert are_inside(inside, [east, west]).tolist() == [True, False, False]
 
 
 def test_what_samples_through_openings_find():
