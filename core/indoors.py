@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 BOUNCED = 3.0
 """So much brighter than what falls in directly is a picture of a room, whose walls give most of it
-back: so much less is it wrong by. In the room of docs/benchmarks/portals.md, 3.1 to 4.1 times."""
+back: so much less is it wrong by. What comes of that: docs/benchmarks/portals.md."""
 
 SOFT = 0.02
 """Of an opening's side: shadows of its edges are told as soft as that at least. Much narrower than

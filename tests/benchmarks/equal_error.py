@@ -193,13 +193,13 @@ def _curve(
         noise=tuple(float(np.var(images[n], axis=0, ddof=1).mean()) / mean**2 for n in samples),
         seconds=tuple(float(np.median(took[n])) for n in samples),
         bias=float(np.sqrt(max(square.mean(), 0))) / mean,
-        unsure=_standard_error(square) / mean**2,
+        unsure=standard_error(square) / mean**2,
         mean=float(np.mean(longest)) / mean - 1,
         memory=memory,
     )
 
 
-def _standard_error(pixels: np.ndarray) -> float:
+def standard_error(pixels: np.ndarray) -> float:
     """Of the mean over pixels that are alike near each other, (height, width, 3)."""
     side = max(len(pixels) // TILES, 1)
     tiles = pixels[: side * TILES, : side * TILES].reshape(TILES, side, TILES, side, 3)

@@ -21,6 +21,7 @@ import numpy as np
 
 from sunsplit.addon import fitted
 from sunsplit.addon.scene import convert_scene
+from sunsplit.core.conversion import Conversion
 from sunsplit.core.portal_noise import (
     LightInside,
     mean_square_told,
@@ -28,6 +29,7 @@ from sunsplit.core.portal_noise import (
     openings_pay,
 )
 from sunsplit.core.settings import ConversionSettings
+from tests.benchmarks.equal_error import standard_error
 from tests.benchmarks.scenes import room
 from tests.blender import timed_render
 
@@ -45,7 +47,8 @@ TARGET = 0.05
 class Result:
     """variance: of a sample, in squares of the mean, seconds of it, and those before the first, of
     each way. lamps: without portals and with them. predicted: see above. chosen: what the program
-    makes; bias: RMS by which its picture stays wrong, against its mean."""
+    makes; bias: RMS by which its picture stays wrong, against its mean, unsure: the standard error
+    of its square, predicted_bias: what the conversion says."""
 
     map: str
     lamps: tuple[int, int]
@@ -55,6 +58,8 @@ class Result:
     predicted: float
     chosen: str
     bias: float
+    unsure: float
+    predicted_bias: float
 
     def cost(self, way: str) -> float:
         k = WAYS.index(way)
@@ -70,11 +75,11 @@ def measure(path: Path, options: argparse.Namespace) -> Result:
     """All ways for one map, interleaved."""
     seen: list[tuple[LightInside, LightInside, bool]] = []
     with tempfile.TemporaryDirectory() as name:
-        folder, lamps = Path(name), []
+        folder, made_of = Path(name), []
         for way in WAYS:
             made = room(path.resolve(), options.size)
             if way != PLAIN:
-                lamps.append(_convert(made, way == WITH, seen))
+                made_of.append(_convert(made, way == WITH, seen))
             _save(folder, way)
         shots: dict[str, list[tuple[np.ndarray, float, float]]] = {way: [] for way in WAYS}
         for seed in range(options.repeats):
@@ -85,21 +90,23 @@ def measure(path: Path, options: argparse.Namespace) -> Result:
                 shots[way].append((image, long, short))
         told, untold, has_table = seen[-1] if seen else (None, None, False)
         chosen = WITH if seen and openings_pay(told, untold, has_table) else WITHOUT
-        bias = _bias(folder, chosen, options.reference)
+        bias, unsure = _bias(folder, chosen, options.reference)
     mean = np.mean([image for way in WAYS for image, *_ in shots[way]])
     return Result(
         path.stem,
-        (lamps[0], lamps[1]),
+        (len(made_of[0].suns), len(made_of[1].suns)),
         *zip(*(_noise_and_time(shots[way], mean, options.samples) for way in WAYS), strict=True),
         mean_square_untold(untold, has_table) / mean_square_told(told) if seen else np.nan,
         chosen,
         bias,
+        unsure,
+        made_of[chosen == WITH].predicted_error,
     )
 
 
-def _bias(folder: Path, way: str, samples: int) -> float:
+def _bias(folder: Path, way: str, samples: int) -> tuple[float, float]:
     """Root mean square of what two pictures of a way have in common that two of the plain HDRI have
-    not, against the mean."""
+    not, against the mean; and the standard error of its square."""
     apart, means = [], []
     for seed in (1001, 1002):
         images = []
@@ -108,18 +115,19 @@ def _bias(folder: Path, way: str, samples: int) -> float:
             images.append(timed_render(bpy.context.scene, folder, samples, seed)[0])
         apart.append(images[1] - images[0])
         means.append(images[0].mean())
-    return float(np.sqrt(max(np.mean(apart[0] * apart[1]), 0)) / np.mean(means))
+    square = apart[0] * apart[1] / np.mean(means) ** 2
+    return float(np.sqrt(max(square.mean(), 0))), standard_error(square)
 
 
-def _convert(made: bpy.types.Scene, portals: bool, seen: list) -> int:
-    """Convert a scene with portals or without, whatever the program would choose; its lamps."""
+def _convert(made: bpy.types.Scene, portals: bool, seen: list) -> Conversion:
+    """Convert a scene with portals or without, whatever the program would choose."""
 
     def choose(*asked: object) -> bool:
         seen.append(asked)
         return portals
 
     with mock.patch.object(fitted, "openings_pay", choose):
-        return len(convert_scene(made, ConversionSettings()).conversion.suns)
+        return convert_scene(made, ConversionSettings()).conversion
 
 
 def _save(folder: Path, way: str) -> None:
@@ -144,7 +152,8 @@ def table(results: Sequence[Result]) -> str:
         "of the mean / milliseconds of a sample: the plain HDRI, a conversion without portals, one "
         "with them; noise without, its square with them being 1, as predicted and as measured; "
         "cost to equal noise without, that with them being 1; how many times sooner than the plain "
-        "HDRI the chosen one is at an error of 5 %, all told; RMS by which it stays wrong.",
+        "HDRI the chosen one is at an error of 5 %, all told; RMS by which it stays wrong, as "
+        "predicted and as measured, give or take.",
         "",
         "| map | lamps without / with | plain | without | with | predicted | measured | cost "
         "| chosen | to 5 % | stays wrong |",
@@ -158,7 +167,8 @@ def table(results: Sequence[Result]) -> str:
         lines.append(
             f"| {r.map} | {r.lamps[0]} / {r.lamps[1]} | {ways} | {r.predicted:.2f} "
             f"| {r.variance[1] / r.variance[2]:.2f} | {r.cost(WITHOUT) / r.cost(WITH):.2f} "
-            f"| {r.chosen} | {_gain(r):.2f} | {r.bias:.1%} |"
+            f"| {r.chosen} | {_gain(r):.2f} "
+            f"| {r.predicted_bias:.1%} / {r.bias:.1%} ± {np.sqrt(r.unsure):.1%} |"
         )
     gains = [np.log(_gain(r)) for r in results if _gain(r) > 0]
     mean = np.exp(np.mean(gains)) if gains else 0.0
