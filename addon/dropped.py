@@ -10,7 +10,7 @@ import bpy
 from . import eevee
 from .packed_skies import as_local, is_packed
 from .restoring import restore_scene, swap_overrides
-from .rig import GUARD
+from .rig import GUARD, TWIN
 from .skies import REPORT, suns_of
 from .trace import TAG
 from .world import unconverted
@@ -119,6 +119,6 @@ def _register(
     made = [thing for thing in suns.objects if thing.get(TAG)]
     state.sky = next((one for one in made if one.type == "EMPTY" and one.parent is None), None)
     for lamp in made:
-        if lamp.type == "LIGHT" and not lamp.get(GUARD):
+        if lamp.type == "LIGHT" and not (lamp.get(GUARD) or lamp.get(TWIN)):
             state.lamps.add().lamp = lamp
     state.report = sky.get(REPORT, "")

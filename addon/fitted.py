@@ -78,7 +78,7 @@ def fitted_conversion(
 
     if closed is None:
         conversion = yield convert(visible)
-        return Fitted(conversion, tree_pays(conversion))
+        return Fitted(conversion, tree_pays(conversion, needs))
     # Where the world is animated, light that comes in now may not, and what does not may.
     moves, to_map = is_animated(light, ()), light.map_from_world
     indoors = None if moves else closed.indoors(environment, visible, to_map)
@@ -87,9 +87,9 @@ def fitted_conversion(
     by_users = has_portals(scene)
     if by_users or not settings.leaves_residual:
         conversion = yield convert(to_indoors(visible, indoors, through if by_users else None))
-        return Fitted(conversion, tree_pays(conversion))
+        return Fitted(conversion, tree_pays(conversion, needs))
     untold = yield convert(to_indoors(visible, indoors))
-    without = Fitted(untold, tree_pays(untold))
+    without = Fitted(untold, tree_pays(untold, needs))
     told = yield convert(to_indoors(visible, indoors, through))
     by_portals = Fitted(told, by_tree=True, openings=closed.openings)
     outside = yield from closed.light(untold, to_map)

@@ -13,7 +13,7 @@ from ..core.environment import LUMINANCE_WEIGHTS
 from ..core.suns import Sun
 from .controls import SOFTNESS, STRENGTH, WARMTH
 from .driven import Formula
-from .rig import SKY, Rig, guards_of, rig_of
+from .rig import SKY, Rig, guards_of, rig_of, twins_of
 from .trace import TAG, constant
 from .world import WorldLight
 
@@ -21,6 +21,7 @@ COLLECTION = "Sunsplit Suns"
 
 GUARDS = "Sunsplit Light Tree Guard"
 
+TWINS = "Sunsplit Sun for Mirrors"
 
 FARTHEST = 5.0
 """Where lamps stand, from the origin: apart, and out of the way. It matters to nothing but the eye,
@@ -83,6 +84,8 @@ def name_lamps(
         empty.name = SKY
     for guard in guards_of(rig.sky):
         guard.name = guard.data.name = GUARDS
+    for twin in twins_of(rig.sky):
+        twin.name = twin.data.name = TWINS
     for rank, (sun, lamp) in enumerate(zip(suns, lamps, strict=True), start=1):
         share = float(sun.scalar_irradiance @ LUMINANCE_WEIGHTS) / whole
         percent = f"{share:.0%}" if share >= LEAST_WHOLE else f"{share:.1%}"

@@ -60,7 +60,8 @@ def tree_plan(
         return TreePlan()  # as the user has it
     if not needs.other_lights and not pays:
         return TreePlan(is_idle=True)
-    if not conversion.suns or not overflows(len(conversion.suns) + _other_suns(scene)):
+    suns = len(conversion.suns) + needs.twins(conversion.suns)
+    if not suns or not overflows(suns + _other_suns(scene)):
         return TreePlan()
     if not found.fog:
         return TreePlan(guarded=True)
@@ -74,12 +75,14 @@ def tree_plan(
     return TreePlan(guarded=True, warnings=(line,))
 
 
-def tree_pays(conversion: Conversion) -> bool:
+def tree_pays(conversion: Conversion, needs: SceneNeeds) -> bool:
     """Whether the tree saves more noise than time, where there are no lights but a conversion's."""
-    if not conversion.suns:
+    suns = conversion.suns
+    if not suns:
         return False
     _, residual = parts_of(conversion, by_strength=True)
-    return needs_light_tree(conversion.suns, conversion.strata.light, residual.variance)
+    idle = needs.twins(suns)
+    return needs_light_tree(suns, conversion.strata.light, residual.variance, idle)
 
 
 def overflows(suns: int) -> bool:

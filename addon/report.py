@@ -98,7 +98,12 @@ def skipped_sentences(
             "Skipped: nothing mirrors sharply, so the world that lights is {width} pixels wide "
             "instead of {own}."
         )
-        lines.append((coarse if needs.mirrors else rough).format(width=width, own=own))
+        apart = said(
+            "Skipped: nothing mirrors it sharply, so the world that lights is {width} pixels wide "
+            "instead of {own}."
+        )
+        smooth = apart if needs.singular else rough
+        lines.append((coarse if needs.mirrors else smooth).format(width=width, own=own))
     if not (conversion.settings.mirrors or conversion.account.share < ALL_LIGHT):
         lines.append(
             said(
@@ -106,8 +111,8 @@ def skipped_sentences(
                 "only the camera sees the world."
             )
         )
-    shown = needs.width_for_camera(own)
-    if not needs.camera_sees_world:
+    shown = needs.shown_width(own)
+    if not needs.shows_map:
         lines.append(
             said("Skipped: the camera does not see the world, so renders do not load the HDRI.")
         )
@@ -116,17 +121,38 @@ def skipped_sentences(
             "Skipped: at this resolution the camera shows no more than {shown} pixels around, so "
             "it gets a map that wide instead of {own}."
         )
-        lines.append(text.format(shown=shown, own=own))
-    if any(sun.angular_diameter <= needs.unmet_width for sun in conversion.suns):
-        lines.append(
-            said(
-                "Skipped: nothing mirrors sharply, so rays need not meet lamps by chance. If you "
-                "add a mirror, convert again: till then it shows no sun."
-            )
+        both = said(
+            "Skipped: at this resolution camera and mirrors show no more than {shown} pixels "
+            "around, so they get a map that wide instead of {own}."
         )
+        lines.append((both if needs.singular else text).format(shown=shown, own=own))
+    if any(sun.angular_diameter <= needs.unmet_width for sun in conversion.suns):
+        alone = said(
+            "Skipped: nothing mirrors sharply, so rays need not meet lamps by chance. If you "
+            "add a mirror, convert again: till then it shows no sun."
+        )
+        besides = said(
+            "Skipped: nothing else mirrors sharply, so rays need not meet lamps by chance. If you "
+            "add something shiny, convert again: till then it shows no sun."
+        )
+        lines.append(besides if needs.singular else alone)
     if tree_off:
         lines.append(said("Skipped: the light tree, as it would take longer than it saves."))
     return lines
+
+
+def mirror_sentences(needs: SceneNeeds, twins: int) -> list[str]:
+    """twins: lamps that mirrors have for themselves."""
+    if not needs.singular:
+        return []
+    if not twins:
+        return [said("Mirrors and clear glass show the HDRI itself instead of lamps.")]
+    return [
+        said(
+            "Mirrors and clear glass show the HDRI itself instead of lamps. If you add some, "
+            "convert again: till then they show both."
+        )
+    ]
 
 
 def portal_sentences(count: int) -> list[str]:

@@ -8,7 +8,8 @@ from . import eevee, passes
 from .lamps import remove_lamps, unlink_lamps
 from .light_groups import remove_groups
 from .portals import remove_portals
-from .rig import guards_of, remove_rig, rig_of
+from .rig import guards_of, remove_rig, rig_of, twins_of
+from .singular import links_of, remove_links
 from .skies import SUNS
 from .world import remove_converted, unconverted
 
@@ -32,7 +33,9 @@ def restore_scene(scene: bpy.types.Scene) -> None:
     passes.remove_suns_layer(scene)
     eevee.take_back(scene)
     remove_groups(scene.view_layers)
-    sky, guards = state.sky, guards_of(state.sky)
+    sky = state.sky
+    lamps += [*guards_of(sky), *twins_of(sky)]
+    links = links_of(lamps)
     _forget(state)
     remove_portals(scene)
     if state.light_tree_off and hasattr(scene, "cycles"):
@@ -43,10 +46,10 @@ def restore_scene(scene: bpy.types.Scene) -> None:
         return
     if converted is not None and not converted.users and SUNS in converted:
         del converted[SUNS]  # else it would keep them
-    made = [*lamps, *guards, *rig_of(sky)]
-    unlink_lamps(scene, collection, made)
-    remove_rig(sky, [*lamps, *guards])
-    remove_lamps([*lamps, *guards])
+    unlink_lamps(scene, collection, [*lamps, *rig_of(sky)])
+    remove_rig(sky, lamps)
+    remove_lamps(lamps)
+    remove_links(links)
     if converted is not None and converted != original:
         remove_converted(converted)
 

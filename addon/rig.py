@@ -24,6 +24,9 @@ SKY = "Sunsplit Sky"
 GUARD = "sunsplit_guard"
 """Custom property of a lamp that gives no light (see `light_tree`)."""
 
+TWIN = "sunsplit_twin"
+"""Custom property of a lamp that only mirrors and clear glass have (see `singular`)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Rig:
@@ -125,6 +128,11 @@ def rig_of(sky: bpy.types.Object | None) -> list[bpy.types.Object]:
 def guards_of(sky: bpy.types.Object | None) -> list[bpy.types.Object]:
     """Lamps of a rig that give no light (see `light_tree`)."""
     return [c for empty in rig_of(sky) for c in empty.children if c.get(GUARD)]
+
+
+def twins_of(sky: bpy.types.Object | None) -> list[bpy.types.Object]:
+    """Lamps of a rig that only mirrors and clear glass have (see `singular`)."""
+    return [c for empty in rig_of(sky) for c in empty.children if c.get(TWIN)]
 
 
 def remove_rig(sky: bpy.types.Object | None, lamps: Sequence[bpy.types.Object]) -> None:

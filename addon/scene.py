@@ -32,13 +32,21 @@ from .light_groups import put_into_groups
 from .light_tree import make_guards, tree_plan
 from .options import SceneOptions
 from .portals import make_portals
-from .report import headline, made_sentences, portal_sentences, skipped_sentences
+from .report import (
+    headline,
+    made_sentences,
+    mirror_sentences,
+    portal_sentences,
+    skipped_sentences,
+)
 from .restoring import restore_scene, swap_overrides
 from .rig import Rig, make_rig, rig_of
 from .scene_needs import ALL, SceneNeeds, needs_steps
+from .singular import make_twins
 from .steps import Apart, Steps, run_at_once
 from .trace import TAG
 from .world import (
+    Shown,
     WorldLight,
     converted_world,
     find_light,
@@ -84,7 +92,8 @@ def conversion_steps(
     if options.two_passes:
         passes.check(scene)
     light = find_light(world, scene.render.engine)
-    found = yield from needs_steps(scene, look=options.skips)
+    by_map = _may_mirror_the_map(scene, settings, options)
+    found = yield from needs_steps(scene, look=options.skips, by_map=by_map)
     needs = found if options.skips else ALL
     environment = yield from read_image(light.image)
     needed = _without_excess(settings, environment.own_width, needs)
@@ -111,6 +120,16 @@ def _world_to_convert(scene: bpy.types.Scene) -> bpy.types.World:
     return world
 
 
+def _may_mirror_the_map(
+    scene: bpy.types.Scene, settings: ConversionSettings, options: SceneOptions
+) -> bool:
+    """Whether mirrors may show the map itself: in Cycles, and where suns are not to be had apart
+    from the sky, in mirrors too."""
+    if scene.render.engine != "CYCLES" or settings.in_eevee:
+        return False
+    return not (options.two_passes or options.light_groups)
+
+
 def _is_converted(scene: bpy.types.Scene) -> bool:
     """Whether the scene shows what its conversion has made."""
     state = scene.sunsplit
@@ -124,9 +143,9 @@ def _write_maps(folder: Path, conversion: Conversion, needs: SceneNeeds) -> list
     if residual is not None:
         maps["residual"] = residual
     environment = conversion.environment
-    width = needs.width_for_camera(environment.own_width)
-    if needs.camera_sees_world and width != environment.own_width:
-        maps["camera"] = environment.narrowed(width)
+    width = needs.shown_width(environment.own_width)
+    if needs.shows_map and width != environment.own_width:
+        maps["map"] = environment.narrowed(width)
     return [write_map(folder, *made) for made in maps.items()]
 
 
@@ -146,19 +165,21 @@ def _replace(
     original = state.original_world if _is_converted(scene) else world
     conversion, openings = fitted.conversion, fitted.openings
     tree = tree_plan(scene, conversion, needs, found, fitted.by_tree)
-    sees_it = needs.camera_sees_world
+    shown = Shown(needs.camera_sees_world, bool(needs.singular))
     try:
-        new = converted_world(world, light, images, fitted.sampling, fitted.has_cells, sees_it)
+        new = converted_world(world, light, images, fitted.sampling, fitted.has_cells, shown)
     finally:
         remove_images(images)
     light = find_light(new, scene.render.engine)  # the same, in the new world
     rig = make_rig(light.texture)
     keep_factors(state.sky, rig.sky)
     lamps = make_lamps(conversion.suns, light, rig, new, needs.unmet_width)
+    twins = make_twins(rig, lamps, needs.singular)
     guards = make_guards(rig, lamps) if tree.guarded else []
     sentences = [
         *made_sentences(conversion),
         *skipped_sentences(conversion, settings, needs, tree.is_idle),
+        *mirror_sentences(needs, len(twins)),
         *portal_sentences(len(openings)),
         *tree.warnings,
         *_warnings(scene, (world, original), light, [*rig_of(rig.sky), *lamps]),
@@ -168,7 +189,7 @@ def _replace(
         sentences += eevee.losses(conversion.residual, light.gain)
     restore_scene(scene)
     name_images(new, conversion.environment.name)
-    result = _install(scene, original, conversion, new, rig, lamps, guards)
+    result = _install(scene, original, conversion, new, rig, lamps, [*twins, *guards])
     make_portals(scene, openings)
     if tree.off:
         scene.cycles.use_light_tree, state.light_tree_off = False, True
@@ -222,7 +243,7 @@ def _install(
     world: bpy.types.World,
     rig: Rig,
     lamps: list[bpy.types.Object],
-    guards: list[bpy.types.Object],
+    helpers: list[bpy.types.Object],
 ) -> SceneConversion:
     """Give a scene its converted world and lamps; the names are free by now."""
     state = scene.sunsplit
@@ -233,7 +254,7 @@ def _install(
     for lamp in lamps:
         state.lamps.add().lamp = lamp
     name_lamps(conversion.suns, lamps, rig, conversion.account.source @ LUMINANCE_WEIGHTS)
-    state.sky, state.collection = rig.sky, collection_of(rig, [*lamps, *guards])
+    state.sky, state.collection = rig.sky, collection_of(rig, [*lamps, *helpers])
     scene.collection.children.link(state.collection)
     return SceneConversion(conversion, world, state.collection)
 

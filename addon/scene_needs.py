@@ -5,17 +5,19 @@ Whatever cannot be told is needed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import bpy
 
 from ..core.environment import whole_part_from
 from ..core.settings import ResidualWidth
+from ..core.suns import Sun
 from .moments import Panes, Sight, sight_of
 from .ordinary import is_all_met, is_seen_as_rendered, shown_things
-from .rig import guards_of, rig_of
+from .rig import guards_of, rig_of, twins_of
 from .shaders import is_seen_through, is_sharp, is_translucent, nodes_of, shines
+from .singular import singular_things
 from .steps import Steps, run_at_once
 from .unmet import unmet_steps
 from .views import finest_width, is_ordinary, view_of
@@ -28,25 +30,41 @@ shows more of it in each of a picture's pixels, some of them less."""
 @dataclass(frozen=True)
 class SceneNeeds:
     """camera_sees_world: or a render may show it behind transparent things. mirrors: something
-    reflects or refracts sharply. other_lights: something but the world and lamps of conversions
-    gives light. fog: something may scatter light on its way. unmet_width: angular diameter, in
-    radians, of the widest suns that rays need not meet (see `unmet`). camera_width: pixels around
-    the sphere that a picture can tell apart; None: any. sight: the scene for rays that ask what
-    light reaches; None: they would not tell. looked: where anything moves, how many frames were
-    looked at, and the first and last of their range."""
+    reflects or refracts sharply, and shows what lights. singular: things that do so exactly, and
+    are shown the map itself (see `singular`). other_lights: something but the world and lamps of
+    conversions gives light. fog: something may scatter light on its way. unmet_width: angular
+    diameter, in radians, of the widest suns that rays need not meet (see `unmet`). camera_width:
+    pixels around the sphere that a picture can tell apart; None: any. sight: the scene for rays
+    that ask what light reaches; None: they would not tell. looked: where anything moves, how many
+    frames were looked at, and the first and last of their range."""
 
     camera_sees_world: bool
     mirrors: bool
     other_lights: bool
     fog: bool = False
     unmet_width: float = 0.0
+    singular: tuple[bpy.types.Object, ...] = ()
     camera_width: int | None = None
     sight: Sight | None = field(default=None, compare=False)
     looked: tuple[int, int, int] | None = None
 
-    def width_for_camera(self, width: int) -> int:
-        """Of the map that the camera sees, for a map of this width."""
-        return whole_part_from(width, self.camera_width) if self.camera_width else width
+    @property
+    def shows_map(self) -> bool:
+        """Whether any ray sees the map itself."""
+        return self.camera_sees_world or bool(self.singular)
+
+    def shown_width(self, width: int) -> int:
+        """Of what rays see of the map itself, for a map of this width."""
+        if self.camera_width is None:
+            return width
+        needed = max(self.camera_width, MIRRORED_WIDTH) if self.singular else self.camera_width
+        return whole_part_from(width, needed)
+
+    def twins(self, suns: Iterable[Sun]) -> int:
+        """How many of these have a lamp for mirrors alone besides."""
+        if not self.singular:
+            return 0
+        return sum(1 for sun in suns if sun.angular_diameter > self.unmet_width)
 
     def residual_width(self, width: int) -> ResidualWidth:
         """Of the map that lights, for a map of this width."""
@@ -67,9 +85,12 @@ def needs_of(scene: bpy.types.Scene) -> SceneNeeds:
     return run_at_once(needs_steps(scene))
 
 
-def needs_steps(scene: bpy.types.Scene, look: bool = True) -> Steps[SceneNeeds]:
+def needs_steps(
+    scene: bpy.types.Scene, look: bool = True, by_map: bool = False
+) -> Steps[SceneNeeds]:
     """Look at a scene: its camera, lamps, materials and shapes; in several frames where they
-    move. look: else only what gives or scatters light is told, and all else needed."""
+    move. look: else only what gives or scatters light is told, and all else needed. by_map: mirrors
+    may show the map itself."""
     ever = users_things(scene, ever=True)
     shown = users_things(scene) if any(thing.hide_render for thing in ever) else ever
     trees = _trees(scene, ever)
@@ -86,13 +107,18 @@ def needs_steps(scene: bpy.types.Scene, look: bool = True) -> Steps[SceneNeeds]:
         sight = yield from sight_of(scene, shown, _panes(shown))
     sees_world = yield from _sees_world(scene, nodes, sight)
     told = sight if sight and _is_told_by_rays(scene, shown, nodes, sight) else None
-    unmet_width = 0.0 if fog else (yield from unmet_steps(nodes, shown, told))
+    singular = singular_things(scene, ever) if by_map and not fog else []
+    if singular:  # then all wear what their slots say
+        nodes = [node for tree in _trees(scene, _but(ever, singular)) for node in nodes_of(tree)]
+    lit = _but(shown, singular)
+    unmet_width = 0.0 if fog else (yield from unmet_steps(nodes, lit, told, bool(singular)))
     return SceneNeeds(
         camera_sees_world=sees_world,
         mirrors=any(is_sharp(node) for node in nodes),
         other_lights=lights,
         fog=fog,
         unmet_width=unmet_width,
+        singular=tuple(singular),
         camera_width=_camera_width(scene, sight),
         sight=told,
         looked=(len(sight.moments), *sight.frames) if sight and sight.frames else None,
@@ -102,9 +128,15 @@ def needs_steps(scene: bpy.types.Scene, look: bool = True) -> Steps[SceneNeeds]:
 def users_things(scene: bpy.types.Scene, ever: bool = False) -> list[bpy.types.Object]:
     """What renders may show and no conversion has made, once each. ever: in any frame."""
     state = scene.sunsplit
-    own = {entry.lamp for entry in state.lamps} | {*rig_of(state.sky), *guards_of(state.sky)}
-    own |= {entry.lamp for entry in state.portals}
+    own = {entry.lamp for entry in (*state.lamps, *state.portals)}
+    own |= {*rig_of(state.sky), *guards_of(state.sky), *twins_of(state.sky)}
     return list(dict.fromkeys(shown_things((t for t in scene.objects if t not in own), ever)))
+
+
+def _but(
+    things: Iterable[bpy.types.Object], some: Sequence[bpy.types.Object]
+) -> list[bpy.types.Object]:
+    return [thing for thing in things if thing not in some]
 
 
 def _is_animated_group(node: bpy.types.Node) -> bool:

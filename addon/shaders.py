@@ -12,6 +12,10 @@ import bpy
 SHARP = 0.25
 """Roughness below which a surface may show single pixels of a wide map."""
 
+EXACT = 0.025
+"""Roughness up to which Cycles reflects and refracts as if there were none, and says so to the
+world (Is Singular Ray): where its squares along and across make up to 5e-7, so up to .0266."""
+
 BENDS = 0.1
 """From how far off 1 an index of refraction spreads light that goes through rough glass; nearer, it
 is as sharp as the lamp that it comes from. At 1.05 nothing of that is left to be seen."""
@@ -44,15 +48,31 @@ def shines(node: bpy.types.Node) -> bool:
 
 
 def is_sharp(node: bpy.types.Node) -> bool:
-    if _lets_straight_through(node):
-        return True
+    return lets_straight_through(node) or any(is_smooth(node, name) for name in gloss_of(node))
+
+
+def gloss_of(node: bpy.types.Node) -> list[str]:
+    """The inputs that say how rough what a node reflects or refracts is, one for each layer."""
     if node.type == "BSDF_PRINCIPLED":
-        coated = is_above(node, "Coat Weight", 0) and is_smooth(node, "Coat Roughness")
-        return coated or is_smooth(node, "Roughness")
-    return node.type in GLOSSY and is_smooth(node, "Roughness")
+        return ["Roughness", *(["Coat Roughness"] if is_above(node, "Coat Weight", 0) else [])]
+    return ["Roughness"] if node.type in GLOSSY else []
 
 
-def _lets_straight_through(node: bpy.types.Node) -> bool:
+def is_exact(node: bpy.types.Node, name: str) -> bool:
+    """Whether a layer of `gloss_of` is, to Cycles, an exact mirror or clear glass."""
+    socket = node.inputs.get(name)
+    if socket is None or socket.is_linked or socket.default_value > EXACT:
+        return False
+    return getattr(node, "distribution", "") != "ASHIKHMIN_SHIRLEY"  # never, however smooth
+
+
+def may_be_exact(node: bpy.types.Node, name: str) -> bool:
+    """The same where it cannot be told."""
+    socket = node.inputs.get(name)
+    return socket is None or socket.is_linked
+
+
+def lets_straight_through(node: bpy.types.Node) -> bool:
     """Whether light goes through as if nothing were there, however rough it is."""
     if node.type == "BSDF_PRINCIPLED":
         if not is_above(node, "Transmission Weight", 0):

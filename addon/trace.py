@@ -349,8 +349,8 @@ def _value(end: Input | Output) -> NDArray[np.float64]:
         return _as_three(end.socket.default_value)
     if node.type == "COMBXYZ":
         return np.array([constant(place.input(index))[0] for index in range(3)])
-    if node.type == "LIGHT_PATH" and end.socket.identifier == "Is Camera Ray":
-        return np.zeros(3)
+    if node.type == "LIGHT_PATH" and (end.socket.identifier == "Is Camera Ray" or node.get(TAG)):
+        return np.zeros(3)  # a conversion asks for rays of mirrors, too, which do not light
     if node.type == "MATH" and node.operation in _MATH:
         return _math(place)
     raise cannot_follow(node, "is not one value for the whole map")

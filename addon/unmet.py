@@ -15,7 +15,15 @@ import bpy
 
 from .changes import SHAPELESS
 from .moments import Sight
-from .shaders import GLOSSY, is_above, is_sharp, is_smooth, nodes_of
+from .shaders import (
+    GLOSSY,
+    gloss_of,
+    is_above,
+    is_exact,
+    is_smooth,
+    lets_straight_through,
+    nodes_of,
+)
 from .steps import Steps
 
 ANY = math.pi
@@ -49,42 +57,54 @@ GIVING = {"NODES", "BOOLEAN"}
 
 
 def unmet_steps(
-    nodes: Iterable[bpy.types.Node], shown: Sequence[bpy.types.Object], sight: Sight | None
+    nodes: Iterable[bpy.types.Node],
+    shown: Sequence[bpy.types.Object],
+    sight: Sight | None,
+    beside: bool = False,
 ) -> Steps[float]:
     """Angular diameter, in radians, of the widest suns that no ray in a scene need meet. nodes: of
     all materials that its things, `shown`, may wear. sight: the scene for rays, if they tell. In an
-    empty scene all are met: mirrors may come."""
-    if not any(map(_has_shape, shown)):
+    empty scene all are met: mirrors may come. beside: there are exact mirrors besides `shown`."""
+    if not beside and not any(map(has_shape, shown)):
         return 0.0
     width = min(map(unmet_width, nodes), default=ANY)
-    if width != WIDE or sight is None or not _are_worn_as_told(shown):
+    if width != WIDE or sight is None or not are_worn_as_told(shown):
         return width
-    lacquered = {thing.name for thing in shown if any(map(_is_faint, _worn_by(thing)))}
+    lacquered = {thing.name for thing in shown if any(map(_is_faint, worn_by(thing)))}
     part = yield from sight.part_of_picture(lacquered)
     return ANY if part <= LITTLE else WIDE
 
 
-def _has_shape(thing: bpy.types.Object) -> bool:
+def has_shape(thing: bpy.types.Object) -> bool:
     if thing.type == "EMPTY":
         return thing.instance_type != "NONE"
     return thing.type not in SHAPELESS
 
 
-def unmet_width(node: bpy.types.Node) -> float:
-    """The same of a surface that is made of this node."""
-    if is_sharp(node):
+def unmet_width(node: bpy.types.Node, but_exact: bool = False) -> float:
+    """The same of a surface that is made of this node. but_exact: as if it had no layer that is an
+    exact mirror or clear glass (see `singular`)."""
+    gloss = [name for name in gloss_of(node) if not (but_exact and is_exact(node, name))]
+    if any(is_smooth(node, name) for name in gloss) or (gloss and lets_straight_through(node)):
         return 0.0
     if node.type == "BSDF_PRINCIPLED":
-        return _unmet_by_lacquer(node)
-    if node.type in GLOSSY:
+        return _unmet_by_layers(node, gloss)
+    if gloss:
         return NARROW
     gives_shader = any(socket.type == "SHADER" for socket in node.outputs)
-    return ANY if node.type in DIFFUSE or not gives_shader else 0.0
+    return ANY if node.type in (DIFFUSE | GLOSSY) or not gives_shader else 0.0
+
+
+def _unmet_by_layers(node: bpy.types.Node, gloss: Sequence[str]) -> float:
+    """Of a Principled BSDF. gloss: of its layers, those that count."""
+    if "Coat Roughness" in gloss or is_above(node, "Sheen Weight", 0):
+        return NARROW
+    return _unmet_by_lacquer(node) if "Roughness" in gloss else ANY
 
 
 def _unmet_by_lacquer(node: bpy.types.Node) -> float:
-    most = {"Metallic": 0, "Transmission Weight": 0, "Coat Weight": 0, "Sheen Weight": 0}
-    most |= {"Specular IOR Level": 0.5, "IOR": LACQUER, "Anisotropic": 0}
+    most = {"Metallic": 0, "Transmission Weight": 0, "Anisotropic": 0}
+    most |= {"Specular IOR Level": 0.5, "IOR": LACQUER}
     if any(is_above(node, name, value) for name, value in most.items()):
         return NARROW
     if not is_smooth(node, "Roughness", ROUGH):
@@ -96,7 +116,7 @@ def _is_faint(node: bpy.types.Node) -> bool:
     return unmet_width(node) == WIDE
 
 
-def _are_worn_as_told(shown: Iterable[bpy.types.Object]) -> bool:
+def are_worn_as_told(shown: Iterable[bpy.types.Object]) -> bool:
     """Whether things wear what their slots say, and nothing that modifiers give them."""
     return not any(
         thing.instance_type != "NONE" or any(made.type in GIVING for made in thing.modifiers)
@@ -104,7 +124,8 @@ def _are_worn_as_told(shown: Iterable[bpy.types.Object]) -> bool:
     )
 
 
-def _worn_by(thing: bpy.types.Object) -> Iterable[bpy.types.Node]:
+def worn_by(thing: bpy.types.Object) -> Iterable[bpy.types.Node]:
+    """The nodes of a thing's materials."""
     for slot in thing.material_slots:
         if slot.material and slot.material.node_tree:
             yield from nodes_of(slot.material.node_tree)

@@ -40,6 +40,21 @@ class WorldLight:
         return self.texture.node.image
 
 
+@dataclass(frozen=True)
+class Shown:
+    """Which rays see the map itself: the camera's, and those that come straight from exact mirrors
+    and clear glass (see `singular`). False where none do."""
+
+    to_camera: bool = True
+    to_mirrors: bool = False
+
+    def __bool__(self) -> bool:
+        return self.to_camera or self.to_mirrors
+
+
+TO_CAMERA = Shown()
+
+
 def find_light(world: bpy.types.World, engine: str = "CYCLES") -> WorldLight:
     """The one environment texture that lights a world under an engine. Raises UnusableInput."""
     found = lighting_textures(world, engine)
@@ -82,13 +97,13 @@ def converted_world(
     images: Mapping[str, bpy.types.Image],
     sampling: WorldSampling,
     has_cells: bool = False,
-    camera_sees_it: bool = True,
+    shown: Shown = TO_CAMERA,
 ) -> bpy.types.World:
-    """A copy of a world in which all rays but the camera's see the residual (or black), or all
-    rays where the camera does not see it: then Cycles does not load the map.
+    """A copy of a world in which all rays see the residual (or black) but those that are shown the
+    map: where none are, Cycles does not load that.
 
     world: what `light` was found in; when it is a converted one, the copy loses what that
-    conversion has put in. images: "residual"; "camera", a narrower map that the camera sees.
+    conversion has put in. images: "residual"; "map", a narrower one in its place.
     sampling: Cycles' for the residual. has_cells: the residual is a Voronoi map. Nothing is left
     behind when this fails.
     """
@@ -112,10 +127,10 @@ def converted_world(
         # Between cells nothing is to be blended: a Voronoi map has edges.
         interpolation = "Closest" if has_cells else texture.interpolation
         mix = _insert(tree, texture, images.get("residual"), interpolation, -300)
-        if camera_sees_it:
-            _show_camera(mix)
-        if "camera" in images:
-            _insert(tree, texture, images["camera"], texture.interpolation, 300)
+        if shown:
+            _show_map(mix, shown)
+        if "map" in images:
+            _insert(tree, texture, images["map"], texture.interpolation, 300)
         _set_sampling(new, sampling)
     except BaseException:  # whatever it is, it goes on; only the half-made copy goes away
         remove_converted(new)
@@ -207,14 +222,39 @@ def _insert(
     return mix
 
 
-def _show_camera(mix: bpy.types.Node) -> None:
-    """Let the camera see the map itself."""
-    tree = mix.id_data
-    path = tree.nodes.new("ShaderNodeLightPath")
-    path.name = path.label = "Sunsplit: Ray"
-    path.location = mix.location.x - 280, mix.location.y + 380
-    path[TAG] = True
-    tree.links.new(path.outputs["Is Camera Ray"], mix.inputs[0])
+def _show_map(mix: bpy.types.Node, shown: Shown) -> None:
+    """Let rays see the map itself."""
+    path = _node_before(mix, "ShaderNodeLightPath", "Sunsplit: Ray", 4)
+    seen = path.outputs["Is Camera Ray"]
+    if shown.to_mirrors:
+        # EEVEE of Blender 4.5 lights with what rays see that are all at once, reflected and let
+        # through: no ray of Cycles is.
+        none = _math(mix, "MULTIPLY", 3, *(path.outputs[f"Is {x} Ray"] for x in _OF_SURFACES))
+        mirrored = _math(mix, "SUBTRACT", 2, path.outputs["Is Singular Ray"], none)
+        seen = _math(mix, "ADD", 1, seen, mirrored) if shown.to_camera else mirrored
+    mix.id_data.links.new(seen, mix.inputs[0])
+
+
+_OF_SURFACES = "Reflection", "Transmission"
+
+
+def _math(
+    mix: bpy.types.Node, operation: str, before: int, *values: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
+    node = _node_before(mix, "ShaderNodeMath", f"Sunsplit: {operation.title()}", before)
+    node.operation = operation
+    for k, value in enumerate(values):
+        mix.id_data.links.new(value, node.inputs[k])
+    return node.outputs[0]
+
+
+def _node_before(mix: bpy.types.Node, kind: str, name: str, before: int) -> bpy.types.Node:
+    """A new node, drawn so many places to the left of a mix."""
+    node = mix.id_data.nodes.new(kind)
+    node.name = node.label = name
+    node.location = mix.location.x - 200 * before, mix.location.y + 380
+    node[TAG] = True
+    return node
 
 
 def _texture_like(

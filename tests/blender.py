@@ -13,7 +13,7 @@ import OpenEXR
 from mathutils import Matrix, Vector
 
 import sunsplit
-from sunsplit.addon.rig import GUARD
+from sunsplit.addon.rig import GUARD, TWIN
 
 
 def fresh_scene() -> bpy.types.Scene:
@@ -83,9 +83,10 @@ def add_mapping(texture: bpy.types.Node) -> bpy.types.Node:
 
 
 def suns(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """The lamps of a conversion, in their order; not what guards Cycles' light tree."""
+    """The lamps of a conversion, in their order; not what guards Cycles' light tree,
+    nor twins for mirrors."""
     lamps = [thing for thing in scene.sunsplit.collection.objects if thing.type == "LIGHT"]
-    return [lamp for lamp in lamps if not lamp.get(GUARD)]
+    return [lamp for lamp in lamps if not (lamp.get(GUARD) or lamp.get(TWIN))]
 
 
 def to_light(lamp: bpy.types.Object) -> np.ndarray:

@@ -365,11 +365,11 @@ def test_an_animated_material_may_become_anything(scene):
 )
 def test_a_map_that_is_seen_is_as_wide_as_a_picture_can_show(width, camera, shown, mirrored):
     needs = SceneNeeds(True, mirrors=True, other_lights=False, camera_width=camera)
-    assert needs.width_for_camera(width) == shown
+    assert needs.shown_width(width) == shown
     assert needs.residual_width(width) == mirrored
     assert replace(needs, mirrors=False).residual_width(width) == "lighting"
     assert ALL.residual_width(width) == "own"
-    assert ALL.width_for_camera(width) == width
+    assert ALL.shown_width(width) == width
 
 
 def test_a_wide_map_lights_with_a_narrower_one(scene, tmp_path):
