@@ -9,11 +9,13 @@ import bpy
 
 from ..core.conversion import Conversion
 from ..core.environment import EnvironmentMap
+from ..core.gloss import Gloss
 from ..core.openings import Opening
 from ..core.portal_noise import LightInside, openings_pay, told_at_its_best, untold_at_its_best
 from ..core.sampling import BY_PORTALS, WorldSampling, choose_sampling
 from ..core.settings import ConversionSettings
-from ..core.visible import VisiblePart, to_indoors, visible_part
+from ..core.visible import VisiblePart, in_gloss, to_indoors, visible_part
+from .glossy import gloss_steps
 from .images import READ
 from .known import known_conversion
 from .light_tree import tree_pays
@@ -77,7 +79,8 @@ def fitted_conversion(
         )
 
     if closed is None:
-        conversion = yield convert(visible)
+        gloss = yield from _gloss(reach, settings, light)
+        conversion = yield convert(in_gloss(visible, gloss))
         return Fitted(conversion, tree_pays(conversion, needs))
     # Where the world is animated, light that comes in now may not, and what does not may.
     moves, to_map = is_animated(light, ()), light.map_from_world
@@ -118,6 +121,15 @@ def _reach(scene: bpy.types.Scene, needs: SceneNeeds) -> Steps[Reach | None]:
     if needs.sight is None or scene.render.engine != "CYCLES":
         return None
     return (yield from Reach.steps(needs.sight))
+
+
+def _gloss(
+    reach: Reach | None, settings: ConversionSettings, light: WorldLight
+) -> Steps[Gloss | None]:
+    """What the picture shows in rough gloss, where that may tell how many lamps it takes."""
+    if reach is None or not settings.shadowed_residual or is_animated(light, ()):
+        return None
+    return (yield from gloss_steps(reach.sight, light.map_from_world))
 
 
 def _what_is_visible(

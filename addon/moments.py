@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -112,6 +112,18 @@ class Moment:
 
     def _may_show(self, names: Container[str], thing: bpy.types.Object) -> bool:
         return thing.name in names or thing.name in self.panes.all or thing.hide_render
+
+    def pictured(self, columns: int, rows: int) -> Iterator[tuple[Vector, Hit | None]]:
+        """Directions of rays through a grid over the picture, and what each meets first."""
+        for start, direction in _rays(self.view, columns, rows):
+            yield direction, self._nearest(start, direction, self.view.far)
+
+    def mirrors_world(self, hit: Hit, direction: Vector, normal: Vector) -> bool:
+        """Whether a ray that is mirrored where it meets a surface leaves the scene. normal: on the
+        side that it comes from."""
+        away = max(OFF * hit.distance, 1e-6)
+        mirrored = direction - 2 * direction.dot(normal) * normal
+        return self.cast(hit.point + normal * away, mirrored) is None
 
     def cast(
         self, start: Vector, direction: Vector, passed: list[Place] | None = None

@@ -19,7 +19,7 @@ from .settings import ConversionSettings
 from .share import choose_strata
 from .strata import Strata
 from .suns import Sun
-from .visible import VisiblePart, to_indoors
+from .visible import VisiblePart, in_gloss, to_indoors
 from .whole_lights import suns_for_whole_lights
 
 
@@ -34,7 +34,7 @@ class Conversion:
     suns are wrong by, as a part of the mean irradiance; see `prediction.Prediction`, and
     `placement.ChosenSuns.standing_error` for walls. ground_error:
     what level ground in the open gets wrong of the worst channel, as a part of its irradiance; 0
-    where it is indoors.
+    where it is indoors. gloss_error: see `placement.ChosenSuns`.
     visible: what suns were chosen from, where that is not the whole map, or indoors. notes: plain
     sentences for the user.
     """
@@ -51,6 +51,7 @@ class Conversion:
     predicted_error: float
     ground_error: float
     standing_error: float | None
+    gloss_error: float | None
     visible: VisiblePart | None
     notes: tuple[str, ...]
 
@@ -93,7 +94,6 @@ def convert(
     """
     settings = settings or ConversionSettings()
     visible = _what_counts(visible, settings)
-    indoors = visible.indoors if visible else None
     progress("strata", 0.0)
     strata = choose_strata(environment, settings, visible)
     progress("region A", 0.3)
@@ -102,12 +102,12 @@ def convert(
     )
     progress("suns", 0.5)
     if settings.takes_whole_lights:
-        light, chosen, notes = suns_for_whole_lights(light, strata, settings, indoors)
+        light, chosen, notes = suns_for_whole_lights(light, strata, settings, visible)
     else:
         notes = ()
         shadowed = settings.shadowed_residual
         unshadowed = None if shadowed else light_of_map(without(environment, light))
-        chosen = choose_suns(light, strata, settings, unshadowed, indoors)
+        chosen = choose_suns(light, strata, settings, unshadowed, visible)
     progress("residual", 0.7)
     residual, levelled, samples = None, None, None
     notes = (*_share_note(strata, settings), *notes, *chosen.notes)
@@ -133,18 +133,21 @@ def convert(
         chosen.predicted_error,
         chosen.ground_error,
         chosen.standing_error,
+        chosen.gloss_error,
         visible,
         notes,
     )
 
 
 def _what_counts(visible: VisiblePart | None, settings: ConversionSettings) -> VisiblePart | None:
-    """All of the map where that is asked for, but to no other places."""
+    """All of the map where that is asked for, but to no other places or surfaces."""
     if visible is None or settings.chooses_border:
         return visible
-    if visible.indoors is None or not settings.shadowed_residual:
+    if not settings.shadowed_residual:
         return None
-    return to_indoors(None, visible.indoors)
+    if visible.indoors is not None:
+        return to_indoors(None, visible.indoors)
+    return in_gloss(None, visible.gloss)
 
 
 def _share_note(strata: Strata, settings: ConversionSettings) -> tuple[str, ...]:

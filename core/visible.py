@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from . import sphere
 from .environment import EnvironmentMap
+from .gloss import Gloss
 from .indoors import Indoors
 
 ROWS = 18
@@ -46,11 +47,13 @@ _SIZE = 2 * ROWS, ROWS
 class VisiblePart:
     """cells: whether light from there may reach something, bool (ROWS, 2 ROWS), rows downwards.
     through: where it is looked for through openings, the part of the half sphere above a place
-    that these take. indoors: places that light reaches through openings only, if there are any."""
+    that these take. indoors: places that light reaches through openings only, if there are any.
+    gloss: what a picture shows in rough gloss."""
 
     cells: NDArray[np.bool_]
     through: float | None = None
     indoors: Indoors | None = None
+    gloss: Gloss | None = None
 
     @cached_property
     def key(self) -> tuple[bytes, float | None]:
@@ -59,8 +62,8 @@ class VisiblePart:
 
     @cached_property
     def whole_key(self) -> tuple[Hashable, ...]:
-        """The same where it is the same to the same places, too."""
-        return *self.key, self.indoors and self.indoors.key
+        """The same where it is the same to the same places, and to what shows it."""
+        return *self.key, self.indoors and self.indoors.key, self.gloss and self.gloss.key
 
     def pixels(self, width: int, height: int) -> NDArray[np.bool_]:
         """Which pixels of a map of this size are visible, (height, width)."""
@@ -93,6 +96,14 @@ def to_indoors(
     known. through: where it is looked for through these, see `VisiblePart`."""
     cells = visible.cells if visible else np.ones((ROWS, 2 * ROWS), bool)
     return VisiblePart(cells, through, indoors)
+
+
+def in_gloss(visible: VisiblePart | None, gloss: Gloss | None) -> VisiblePart | None:
+    """The same, or all of a map, that a picture shows in rough gloss, if it does."""
+    if gloss is None:
+        return visible
+    cells = visible.cells if visible else np.ones((ROWS, 2 * ROWS), bool)
+    return VisiblePart(cells, gloss=gloss)
 
 
 def visible_part(environment: EnvironmentMap, looks: Looks) -> VisiblePart | None:

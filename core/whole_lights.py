@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import sphere
-from .indoors import Indoors
 from .memo import Memo
 from .noise import OTHERWISE, squared_noise
 from .placement.choice import choose_suns
@@ -22,6 +21,7 @@ from .placement.placement import ChosenSuns
 from .region import RegionLight
 from .settings import ConversionSettings
 from .strata import Strata
+from .visible import VisiblePart
 
 Floats = NDArray[np.float64]
 
@@ -66,10 +66,10 @@ def suns_for_whole_lights(
     light: RegionLight,
     strata: Strata,
     settings: ConversionSettings,
-    indoors: Indoors | None = None,
+    visible: VisiblePart | None = None,
 ) -> tuple[RegionLight, ChosenSuns, tuple[str, ...]]:
-    """The light that suns replace, those suns, and what the user should know of the rest. indoors:
-    the places that the light reaches, where it does so through openings only.
+    """The light that suns replace, those suns, and what the user should know of the rest. visible:
+    see `choose_suns`.
 
     Where as many suns as were asked for stand for it only badly, half of the spots at a time are
     left in the residual, down to one for each sun, if noise is the lesser evil.
@@ -81,7 +81,7 @@ def suns_for_whole_lights(
     for k, count in enumerate(counts):
         if min(noise[k:]) >= least:  # however well suns stand for the rest
             break
-        chosen = choose_suns(groups.brightest(count), strata, settings, indoors=indoors)
+        chosen = choose_suns(groups.brightest(count), strata, settings, visible=visible)
         evil = chosen.predicted_error**2 + noise[k]
         if evil < least:
             best, least = (count, chosen), evil

@@ -8,14 +8,19 @@ from math import hypot
 
 import numpy as np
 
+from ..gloss import Gloss
 from ..indoors import Indoors
 from ..patches import MOST_PATCHES, Patches, patches_of
 from ..prediction import Prediction
 from ..region import RegionLight
 from ..settings import ConversionSettings
 from ..strata import Strata
-from .edge import edge_suns
+from ..visible import VisiblePart
+from .edge import edge_suns, suns_of_cells
+from .edge_cells import cells_of
+from .edge_light import EdgeLight
 from .edge_split import split_of
+from .gloss_cuts import cut_for_gloss, owners, shown_light
 from .level import Level, levelled
 from .light_count import fewest, first_guess
 from .placement import NO_SUN, ON_GROUND, ON_WALLS, ChosenSuns
@@ -39,6 +44,9 @@ both are good to a tenth only."""
 MOST_INDOORS = 64
 """By itself: where little of a light grazes a window, all that comes in of it is an edge."""
 
+MOST_IN_GLOSS = 64
+"""By itself: more are not worth what they cost to show a floor's reflections a little truer."""
+
 TILTS_COST = 0.65, 2.6
 """See `level.levelled`: the median of 191 sets of suns under eight maps, and what nine in ten of
 them do not exceed. That is tried where shadows of tilted discs are more wrong than was thought."""
@@ -49,13 +57,15 @@ def choose_suns(
     strata: Strata,
     settings: ConversionSettings,
     unshadowed: RegionLight | None = None,
-    indoors: Indoors | None = None,
+    visible: VisiblePart | None = None,
 ) -> ChosenSuns:
     """Suns that hold all of the light, and what shadows are predicted to be wrong by.
 
-    unshadowed: the rest of the map, where the target shows it without shadows. indoors: the places
-    that the light reaches, where it does so through openings only.
+    unshadowed: the rest of the map, where the target shows it without shadows. visible: tells the
+    places that the light reaches, where it does so through openings only, and what shows it in
+    rough gloss.
     """
+    indoors, gloss = (visible.indoors, visible.gloss) if visible else (None, None)
     light = light.lit
     rest = patches_of(unshadowed, unshadowed.luminous_flux) if unshadowed else None
     eevee = settings.in_eevee
@@ -74,21 +84,35 @@ def choose_suns(
     allowed = settings.allowed_error(max(prediction.part, prediction.part_inside))
     if allowed is not None and settings.tolerance is None:
         allowed = hypot(allowed, 100 * prediction.of_residual)
+    within = None if allowed is None else allowed / 100
     if settings.method != "edge":
-
-        def sampled(count: int) -> ChosenSuns:
-            return _judged(sampled_suns(light, strata, settings, count), prediction, strata)
-
-        if allowed is None:
-            chosen = sampled(settings.most_lights)
-        else:
-            chosen = fewest(sampled, allowed / 100, settings.most_lights)
-    elif allowed is None:
+        chosen = _by_samples(light, strata, settings, prediction, within)
+    elif within is None:
         chosen = _as_many_as_help(light, strata, settings, prediction)
     else:
-        chosen = _fewest_by_edge(light, strata, settings, prediction, allowed / 100)
+        chosen = _fewest_by_edge(light, strata, settings, prediction, within)
+    if gloss is not None and settings.method == "edge" and settings.shape == "disc":
+        chosen = _mirrored(chosen, light, patches, strata, settings, gloss)
+        chosen = _judged(chosen, prediction, strata)
+        if within is not None:
+            chosen = _levelled(chosen, prediction, strata, within)
     notes = (*chosen.notes, *_count_note(chosen, light, settings, prediction, allowed))
     return replace(chosen, notes=notes)
+
+
+def _by_samples(
+    light: RegionLight,
+    strata: Strata,
+    settings: ConversionSettings,
+    prediction: Prediction,
+    allowed: float | None,
+) -> ChosenSuns:
+    def sampled(count: int) -> ChosenSuns:
+        return _judged(sampled_suns(light, strata, settings, count), prediction, strata)
+
+    if allowed is None:
+        return sampled(settings.most_lights)
+    return fewest(sampled, allowed, settings.most_lights)
 
 
 def _as_many_as_help(
@@ -144,6 +168,36 @@ def _fewest_by_edge(
     quickly, with_care = (partial(of_cells, rough=rough) for rough in (True, False))
     found = fewest(quickly, allowed, most, expected, with_care)
     return min(found, with_care(len(found.suns)), key=lambda one: one.worst)
+
+
+def _mirrored(
+    chosen: ChosenSuns,
+    light: RegionLight,
+    patches: Patches,
+    strata: Strata,
+    settings: ConversionSettings,
+    gloss: Gloss,
+) -> ChosenSuns:
+    """The same suns, or more where rough gloss shows them to be discs, with what is wrong of that;
+    not judged by anything else."""
+    shown = light.latest("gloss", (strata, gloss.key), lambda: shown_light(gloss, patches))
+    wanted = shown.sum(axis=1)
+
+    def told(suns: ChosenSuns) -> ChosenSuns:
+        wrong = gloss.shown_of(suns.suns) - wanted
+        return replace(suns, gloss_error=gloss.error(wrong, strata.light))
+
+    chosen = told(chosen)
+    allowed, most = settings.tolerated / 100, settings.most_lights
+    if settings.lights is None:
+        most = max(min(most, MOST_IN_GLOSS), len(chosen.suns))
+    if chosen.gloss_error <= allowed or len(chosen.suns) >= most:
+        return chosen
+    parts = EdgeLight.of(patches, settings.shape)
+    owner = owners(chosen.taken, light, patches)
+    owner = cut_for_gloss(parts, patches, owner, gloss, shown, strata.light, allowed, most)
+    cut = told(suns_of_cells(cells_of(parts, owner), patches, strata, settings))
+    return min(chosen, replace(cut, notes=chosen.notes), key=lambda one: one.gloss_error)
 
 
 def _levelled(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,10 +39,17 @@ def edge_suns(
     notes = ()
     if settings.samples or settings.per_stratum or settings.position == "sample":
         notes = ("Samples, per stratum and position are of the other methods: edge has none.",)
+    return replace(suns_of_cells(cells, patches, strata, settings), notes=notes)
+
+
+def suns_of_cells(
+    cells: PatchCells, patches: Patches, strata: Strata, settings: ConversionSettings
+) -> ChosenSuns:
+    """A sun for each of some cells of patches; not judged yet."""
     order = np.argsort(-(cells.flux @ LUMINANCE_WEIGHTS), kind="stable")
     rank = np.argsort(order)
     taken = Taken(patches.squares, rank[cells.owner])
-    return ChosenSuns(_suns(cells, order, patches, strata, settings), np.nan, notes, taken=taken)
+    return ChosenSuns(_suns(cells, order, patches, strata, settings), np.nan, (), taken=taken)
 
 
 def _suns(

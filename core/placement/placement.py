@@ -54,7 +54,9 @@ class ChosenSuns:
     predicted_error: see `prediction.Prediction`. ground_error: of the irradiance of level ground in
     the open, by the worst channel. Both nan before they are known. standing_error: what walls on
     that ground get wrong, root mean square, as a part of the mean irradiance; None where that is
-    not predicted. taken: the light of each, None without suns.
+    not predicted. gloss_error: what a picture shows wrong in rough gloss, root mean square, as a
+    part of what the map shows on average; None where that is not known. taken: the light of each,
+    None without suns.
     """
 
     suns: tuple[Sun, ...]
@@ -62,13 +64,14 @@ class ChosenSuns:
     notes: tuple[str, ...]
     ground_error: float = np.nan
     standing_error: float | None = None
+    gloss_error: float | None = None
     taken: Taken | None = None
 
     @property
     def worst(self) -> float:
         """What a tolerance is held against."""
-        walls = self.standing_error or 0.0
-        return max(self.predicted_error, self.ground_error / ON_GROUND, walls / ON_WALLS)
+        walls, gloss = self.standing_error or 0.0, self.gloss_error or 0.0
+        return max(self.predicted_error, self.ground_error / ON_GROUND, walls / ON_WALLS, gloss)
 
 
 Place = Callable[[RegionLight, int], Placement]
