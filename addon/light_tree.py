@@ -29,6 +29,11 @@ CORNERS = (1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)
 """Towards guards: of a regular tetrahedron, so a surface faces one within 71 degrees."""
 
 
+MIRRORED = 45.0
+"""Variance of a sample in a picture that is all mirrors and clear glass, in squares of the mean:
+their glints are noise however suns are chosen. By docs/benchmarks/light_tree.md."""
+
+
 @dataclass(frozen=True)
 class TreePlan:
     """is_idle: the tree costs more than it saves. is_wrong: it would leave out light. Either way it
@@ -77,12 +82,11 @@ def tree_plan(
 
 def tree_pays(conversion: Conversion, needs: SceneNeeds) -> bool:
     """Whether the tree saves more noise than time, where there are no lights but a conversion's."""
-    suns = conversion.suns
-    if not suns:
+    if not conversion.suns:
         return False
     _, residual = parts_of(conversion, by_strength=True)
-    idle = needs.twins(suns)
-    return needs_light_tree(suns, conversion.strata.light, residual.variance, idle)
+    beside = residual.variance + MIRRORED * needs.mirrored_part
+    return needs_light_tree(conversion.suns, conversion.strata.light, beside)
 
 
 def overflows(suns: int) -> bool:

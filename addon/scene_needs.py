@@ -19,7 +19,7 @@ from .rig import guards_of, rig_of, twins_of
 from .shaders import is_seen_through, is_sharp, is_translucent, nodes_of, shines
 from .singular import singular_things
 from .steps import Steps, run_at_once
-from .unmet import unmet_steps
+from .unmet import unmet_steps, worn_by
 from .views import finest_width, is_ordinary, view_of
 
 MIRRORED_WIDTH = 1024
@@ -27,11 +27,16 @@ MIRRORED_WIDTH = 1024
 shows more of it in each of a picture's pixels, some of them less."""
 
 
+MIRRORED_PART = 0.05
+"""What that counts as where it cannot be told."""
+
+
 @dataclass(frozen=True)
 class SceneNeeds:
     """camera_sees_world: or a render may show it behind transparent things. mirrors: something
     reflects or refracts sharply, and shows what lights. singular: things that do so exactly, and
-    are shown the map itself (see `singular`). other_lights: something but the world and lamps of
+    are shown the map itself (see `singular`). mirrored_part: how much of the picture either of them
+    is. other_lights: something but the world and lamps of
     conversions gives light. fog: something may scatter light on its way. unmet_width: angular
     diameter, in radians, of the widest suns that rays need not meet (see `unmet`). camera_width:
     pixels around the sphere that a picture can tell apart; None: any. sight: the scene for rays
@@ -44,6 +49,7 @@ class SceneNeeds:
     fog: bool = False
     unmet_width: float = 0.0
     singular: tuple[bpy.types.Object, ...] = ()
+    mirrored_part: float = 0.0
     camera_width: int | None = None
     sight: Sight | None = field(default=None, compare=False)
     looked: tuple[int, int, int] | None = None
@@ -105,23 +111,29 @@ def needs_steps(
     sight = None
     if is_seen_as_rendered(scene, shown):
         sight = yield from sight_of(scene, shown, _panes(shown))
-    sees_world = yield from _sees_world(scene, nodes, sight)
     told = sight if sight and _is_told_by_rays(scene, shown, nodes, sight) else None
-    singular = singular_things(scene, ever) if by_map and not fog else []
-    if singular:  # then all wear what their slots say
-        nodes = [node for tree in _trees(scene, _but(ever, singular)) for node in nodes_of(tree)]
-    lit = _but(shown, singular)
-    unmet_width = 0.0 if fog else (yield from unmet_steps(nodes, lit, told, bool(singular)))
-    return SceneNeeds(
-        camera_sees_world=sees_world,
+    needs = SceneNeeds(
+        camera_sees_world=(yield from _sees_world(scene, nodes, sight)),
         mirrors=any(is_sharp(node) for node in nodes),
         other_lights=lights,
         fog=fog,
-        unmet_width=unmet_width,
-        singular=tuple(singular),
         camera_width=_camera_width(scene, sight),
         sight=told,
         looked=(len(sight.moments), *sight.frames) if sight and sight.frames else None,
+    )
+    if needs.mirrors:
+        needs = replace(needs, mirrored_part=(yield from _mirrored_part(ever, told)))
+    if fog:
+        return needs
+    singular = singular_things(scene, ever) if by_map and needs.mirrors else []
+    if singular:  # then all wear what their slots say
+        ever, shown = _but(ever, singular), _but(shown, singular)
+        nodes = [node for tree in _trees(scene, ever) for node in nodes_of(tree)]
+    return replace(
+        needs,
+        mirrors=any(is_sharp(node) for node in nodes),
+        singular=tuple(singular),
+        unmet_width=(yield from unmet_steps(nodes, shown, told, bool(singular))),
     )
 
 
@@ -131,6 +143,14 @@ def users_things(scene: bpy.types.Scene, ever: bool = False) -> list[bpy.types.O
     own = {entry.lamp for entry in (*state.lamps, *state.portals)}
     own |= {*rig_of(state.sky), *guards_of(state.sky), *twins_of(state.sky)}
     return list(dict.fromkeys(shown_things((t for t in scene.objects if t not in own), ever)))
+
+
+def _mirrored_part(shown: Sequence[bpy.types.Object], sight: Sight | None) -> Steps[float]:
+    """How much of the picture are things that mirror sharply, or refract."""
+    if sight is None:
+        return MIRRORED_PART
+    sharp = {thing.name for thing in shown if any(map(is_sharp, worn_by(thing)))}
+    return (yield from sight.part_of_picture(sharp))
 
 
 def _but(

@@ -85,33 +85,31 @@ def choose_sampling(
     return WorldSampling("MANUAL", min(residual.shape[1], SMALL_TABLE))
 
 
-def needs_light_tree(suns: Sequence[Sun], light: float, beside: float = 0.0, idle: int = 0) -> bool:
+def needs_light_tree(suns: Sequence[Sun], light: float, beside: float = 0.0) -> bool:
     """Whether suns should be chosen by their strength, which takes time for each, or by lot, which
     is noisier where they are not alike.
 
     light: luminance of the whole map's scalar irradiance. beside: variance of a sample that comes
-    from the residual, however suns are chosen. idle: suns besides that do not light a surface,
-    which lots may fall on.
+    from the residual, however suns are chosen.
     """
     count = len(suns)
     if count <= 1:
         return False
-    both = variance_of_suns(suns, light, idle)
-    by_strength, by_lot = (beside + variance for variance in both)
+    by_strength, by_lot = (beside + variance for variance in variance_of_suns(suns, light))
     return by_strength * (1 + TIME_BY_TREE * count) < by_lot * (1 + TIME_BY_LOT * count)
 
 
-def variance_of_suns(suns: Sequence[Sun], light: float, idle: int = 0) -> tuple[float, float]:
+def variance_of_suns(suns: Sequence[Sun], light: float) -> tuple[float, float]:
     """Of a sample that chooses one of these suns by its strength, and by lot (see `noise`).
 
-    light: luminance of the whole map's scalar irradiance. idle: see `needs_light_tree`.
+    light: luminance of the whole map's scalar irradiance.
     """
     flux = np.array([sun.scalar_irradiance for sun in suns]) @ LUMINANCE_WEIGHTS / light
     each = flux[:, None] * harmonics(np.array([sun.to_light for sun in suns]))
     together = each.sum(axis=0)
     seen = mean_square_irradiance(together)
     by_strength = square_from_one_place(together) - seen
-    by_lot = (len(suns) + idle) * square_from_one_place(each).sum() - seen
+    by_lot = len(suns) * square_from_one_place(each).sum() - seen
     return 16 * float(by_strength) + OTHERWISE, 16 * float(by_lot) + OTHERWISE
 
 

@@ -47,6 +47,10 @@ MOST_INDOORS = 64
 MOST_IN_GLOSS = 64
 """By itself: more are not worth what they cost to show a floor's reflections a little truer."""
 
+ROUNDS, STRICTER = 6, 0.9
+"""So often are cells cut further, with so much less allowed at least, if what tilts their discs for
+level ground is shown by gloss."""
+
 TILTS_COST = 0.65, 2.6
 """See `level.levelled`: the median of 191 sets of suns under eight maps, and what nine in ten of
 them do not exceed. That is tried where shadows of tilted discs are more wrong than was thought."""
@@ -92,10 +96,7 @@ def choose_suns(
     else:
         chosen = _fewest_by_edge(light, strata, settings, prediction, within)
     if gloss is not None and settings.method == "edge" and settings.shape == "disc":
-        chosen = _mirrored(chosen, light, patches, strata, settings, gloss)
-        chosen = _judged(chosen, prediction, strata)
-        if within is not None:
-            chosen = _levelled(chosen, prediction, strata, within)
+        chosen = _mirrored(chosen, light, patches, strata, settings, prediction, gloss, within)
     notes = (*chosen.notes, *_count_note(chosen, light, settings, prediction, allowed))
     return replace(chosen, notes=notes)
 
@@ -176,10 +177,12 @@ def _mirrored(
     patches: Patches,
     strata: Strata,
     settings: ConversionSettings,
+    prediction: Prediction,
     gloss: Gloss,
+    allowed: float | None,
 ) -> ChosenSuns:
-    """The same suns, or more where rough gloss shows them to be discs, with what is wrong of that;
-    not judged by anything else."""
+    """The same suns, or more where rough gloss shows them to be discs, with what is wrong of that.
+    allowed: of shadows; suns are tilted for that, which gloss shows too."""
     shown = light.latest("gloss", (strata, gloss.key), lambda: shown_light(gloss, patches))
     wanted = shown.sum(axis=1)
 
@@ -187,17 +190,23 @@ def _mirrored(
         wrong = gloss.shown_of(suns.suns) - wanted
         return replace(suns, gloss_error=gloss.error(wrong, strata.light))
 
-    chosen = told(chosen)
-    allowed, most = settings.tolerated / 100, settings.most_lights
+    best = told(chosen)
+    aim, most = settings.tolerated / 100, settings.most_lights
     if settings.lights is None:
         most = max(min(most, MOST_IN_GLOSS), len(chosen.suns))
-    if chosen.gloss_error <= allowed or len(chosen.suns) >= most:
-        return chosen
-    parts = EdgeLight.of(patches, settings.shape)
-    owner = owners(chosen.taken, light, patches)
-    owner = cut_for_gloss(parts, patches, owner, gloss, shown, strata.light, allowed, most)
-    cut = told(suns_of_cells(cells_of(parts, owner), patches, strata, settings))
-    return min(chosen, replace(cut, notes=chosen.notes), key=lambda one: one.gloss_error)
+    if best.gloss_error <= aim or len(chosen.suns) >= most:
+        return best
+    parts, owner = EdgeLight.of(patches, settings.shape), owners(chosen.taken, light, patches)
+    for _ in range(ROUNDS):
+        owner = cut_for_gloss(parts, patches, owner, gloss, shown, strata.light, aim, most)
+        cut = suns_of_cells(cells_of(parts, owner), patches, strata, settings)
+        cut = _judged(replace(cut, notes=chosen.notes), prediction, strata)
+        cut = told(cut if allowed is None else _levelled(cut, prediction, strata, allowed))
+        best = min(best, cut, key=lambda one: one.gloss_error)
+        if cut.gloss_error <= settings.tolerated / 100 or len(cut.suns) >= most:
+            break
+        aim *= min(settings.tolerated / 100 / cut.gloss_error, STRICTER)
+    return best
 
 
 def _levelled(
