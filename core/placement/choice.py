@@ -23,7 +23,7 @@ from .edge_split import split_of
 from .gloss_cuts import cut_for_gloss, owners, shown_light
 from .level import Level, levelled
 from .light_count import fewest, first_guess
-from .placement import NO_SUN, ON_GROUND, ON_WALLS, ChosenSuns
+from .placement import NO_SUN, ON_GLOSS, ON_GROUND, ON_WALLS, ChosenSuns
 from .sampled import sampled_suns
 
 PER_LIGHT, FEWEST_PATCHES = 128, 2048
@@ -47,9 +47,8 @@ MOST_INDOORS = 64
 MOST_IN_GLOSS = 64
 """By itself: more are not worth what they cost to show a floor's reflections a little truer."""
 
-ROUNDS, STRICTER = 6, 0.9
-"""So often are cells cut further, with so much less allowed at least, if what tilts their discs for
-level ground is shown by gloss."""
+ROUNDS = 6
+"""So often are cells cut further, if what tilts their discs for level ground is shown by gloss."""
 
 TILTS_COST = 0.65, 2.6
 """See `level.levelled`: the median of 191 sets of suns under eight maps, and what nine in ten of
@@ -179,10 +178,10 @@ def _mirrored(
     settings: ConversionSettings,
     prediction: Prediction,
     gloss: Gloss,
-    allowed: float | None,
+    of_shadows: float | None,
 ) -> ChosenSuns:
     """The same suns, or more where rough gloss shows them to be discs, with what is wrong of that.
-    allowed: of shadows; suns are tilted for that, which gloss shows too."""
+    of_shadows: what is allowed of them; suns are tilted for that, which gloss shows too."""
     shown = light.latest("gloss", (strata, gloss.key), lambda: shown_light(gloss, patches))
     wanted = shown.sum(axis=1)
 
@@ -192,20 +191,21 @@ def _mirrored(
 
     best = told(chosen)
     aim, most = settings.tolerated / 100, settings.most_lights
+    allowed = ON_GLOSS * aim
     if settings.lights is None:
         most = max(min(most, MOST_IN_GLOSS), len(chosen.suns))
-    if best.gloss_error <= aim or len(chosen.suns) >= most:
+    if best.gloss_error <= allowed or len(chosen.suns) >= most:
         return best
     parts, owner = EdgeLight.of(patches, settings.shape), owners(chosen.taken, light, patches)
     for _ in range(ROUNDS):
         owner = cut_for_gloss(parts, patches, owner, gloss, shown, strata.light, aim, most)
         cut = suns_of_cells(cells_of(parts, owner), patches, strata, settings)
         cut = _judged(replace(cut, notes=chosen.notes), prediction, strata)
-        cut = told(cut if allowed is None else _levelled(cut, prediction, strata, allowed))
+        cut = told(_levelled(cut, prediction, strata, of_shadows) if of_shadows else cut)
         best = min(best, cut, key=lambda one: one.gloss_error)
-        if cut.gloss_error <= settings.tolerated / 100 or len(cut.suns) >= most:
+        if cut.gloss_error <= allowed or len(cut.suns) >= most:
             break
-        aim *= min(settings.tolerated / 100 / cut.gloss_error, STRICTER)
+        aim *= allowed / cut.gloss_error
     return best
 
 

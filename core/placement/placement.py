@@ -47,6 +47,10 @@ ON_WALLS = 1.0
 """And so much on walls that stand on it: each is wrong all over, but they are many."""
 
 
+ON_GLOSS = 1.2
+"""And so much of what gloss shows in a picture, which is good to a fifth as predicted."""
+
+
 @dataclass(frozen=True, eq=False)
 class ChosenSuns:
     """Suns, brightest first, and notes for the user.
@@ -71,7 +75,12 @@ class ChosenSuns:
     def worst(self) -> float:
         """What a tolerance is held against."""
         walls, gloss = self.standing_error or 0.0, self.gloss_error or 0.0
-        return max(self.predicted_error, self.ground_error / ON_GROUND, walls / ON_WALLS, gloss)
+        return max(
+            self.predicted_error,
+            self.ground_error / ON_GROUND,
+            walls / ON_WALLS,
+            gloss / ON_GLOSS,
+        )
 
 
 Place = Callable[[RegionLight, int], Placement]
