@@ -12,9 +12,9 @@ import bpy
 SHARP = 0.25
 """Roughness below which a surface may show single pixels of a wide map."""
 
-EXACT = 0.025
+EXACT = 0.003
 """Roughness up to which Cycles reflects and refracts as if there were none, and says so to the
-world (Is Singular Ray): where its squares along and across make up to 5e-7, so up to .0266."""
+world (Is Singular Ray). At .004 it does not."""
 
 BENDS = 0.1
 """From how far off 1 an index of refraction spreads light that goes through rough glass; nearer, it
@@ -61,7 +61,7 @@ def gloss_of(node: bpy.types.Node) -> list[str]:
 def is_exact(node: bpy.types.Node, name: str) -> bool:
     """Whether a layer of `gloss_of` is, to Cycles, an exact mirror or clear glass."""
     socket = node.inputs.get(name)
-    if socket is None or socket.is_linked or socket.default_value > EXACT:
+    if socket is None or socket.is_linked or socket.default_value > 1.001 * EXACT:
         return False
     return getattr(node, "distribution", "") != "ASHIKHMIN_SHIRLEY"  # never, however smooth
 

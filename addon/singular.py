@@ -19,7 +19,7 @@ from .driven import Formula
 from .rig import TWIN, Rig
 from .shaders import gloss_of, is_exact, may_be_exact
 from .trace import TAG
-from .unmet import WIDE, are_worn_as_told, has_shape, unmet_width, worn_by
+from .unmet import GIVING, WIDE, has_shape, unmet_width, worn_by
 
 ALL_BUT, ONLY = "Sunsplit All but Mirrors", "Sunsplit Mirrors"
 """Collections of what lamps are linked to."""
@@ -34,7 +34,9 @@ def singular_things(
     """The things that are exact mirrors or clear glass, or have a layer that is; none where not all
     of them can be told, or where one of them has a rougher gloss besides, which must meet lamps.
     shown: all that renders may show."""
-    if any(layer.material_override for layer in scene.view_layers) or not are_worn_as_told(shown):
+    if any(layer.material_override for layer in scene.view_layers):
+        return []
+    if any(made.type in GIVING for thing in shown for made in thing.modifiers):
         return []
     found = []
     for thing in filter(has_shape, shown):

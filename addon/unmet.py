@@ -52,8 +52,8 @@ DIFFUSE = {
 }
 """Nodes with a shader that reflect evenly, or nothing themselves."""
 
-GIVING = {"NODES", "BOOLEAN"}
-"""Modifiers that may give a thing materials of others."""
+GIVING = {"NODES", "BOOLEAN", "PARTICLE_SYSTEM"}
+"""Modifiers that may give a thing materials of others, or show others in its place."""
 
 
 def unmet_steps(
@@ -68,7 +68,7 @@ def unmet_steps(
     if not beside and not any(map(has_shape, shown)):
         return 0.0
     width = min(map(unmet_width, nodes), default=ANY)
-    if width != WIDE or sight is None or not are_worn_as_told(shown):
+    if width != WIDE or sight is None or not _are_worn_as_told(shown):
         return width
     lacquered = {thing.name for thing in shown if any(map(_is_faint, worn_by(thing)))}
     part = yield from sight.part_of_picture(lacquered)
@@ -116,7 +116,7 @@ def _is_faint(node: bpy.types.Node) -> bool:
     return unmet_width(node) == WIDE
 
 
-def are_worn_as_told(shown: Iterable[bpy.types.Object]) -> bool:
+def _are_worn_as_told(shown: Iterable[bpy.types.Object]) -> bool:
     """Whether things wear what their slots say, and nothing that modifiers give them."""
     return not any(
         thing.instance_type != "NONE" or any(made.type in GIVING for made in thing.modifiers)

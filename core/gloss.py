@@ -21,8 +21,12 @@ from .suns import Sun
 
 Floats = NDArray[np.float64]
 
-PIECES = 48
-"""Points in a spiral that stand for a disc. Each is blurred by its own width, too."""
+PIECE = np.radians(1.5)
+"""Points in a spiral stand for a disc, so far from each other at most. Each is blurred by its own
+width, too: of a roughness of .25 light is seen blurred by 7 degrees."""
+
+FEWEST, MOST = 16, 1024
+"""Of these points."""
 
 GRAZING = 1e-3
 """The least cosine to a surface that is told: nothing is seen from lower down."""
@@ -71,6 +75,8 @@ class Gloss:
 
     def shown_of(self, suns: Sequence[Sun]) -> Floats:
         """Luminance at each point from some suns, (k,)."""
+        if not len(suns):
+            return np.zeros(len(self.roughness))
         to_light = np.array([sun.to_light for sun in suns]).reshape(-1, 3)
         flux = np.array([sun.scalar_irradiance for sun in suns]).reshape(-1, 3) @ LUMINANCE_WEIGHTS
         return self.shown_of_discs(to_light, np.array([sun.angular_diameter for sun in suns]), flux)
@@ -78,9 +84,10 @@ class Gloss:
     def shown_of_discs(self, to_light: Floats, diameters: Floats, flux: Floats) -> Floats:
         """The same of discs: (n, 3), radians, (n,), and luminous scalar irradiance, (n,)."""
         cap = 2 * np.sin(diameters / 4) ** 2
-        half = np.sqrt(2 * np.pi * cap / PIECES) / 2
-        points = sphere.spirals(to_light, cap, np.full(len(cap), PIECES))
-        return self.shown(points, np.repeat(half, PIECES)) @ np.repeat(flux / PIECES, PIECES)
+        counts = np.clip(np.ceil(2 * np.pi * cap / PIECE**2), FEWEST, MOST).astype(int)
+        half = np.sqrt(2 * np.pi * cap / counts) / 2
+        points = sphere.spirals(to_light, cap, counts)
+        return self.shown(points, np.repeat(half, counts)) @ np.repeat(flux / counts, counts)
 
     def error(self, wrong: Floats, all_light: float) -> float:
         """Root mean square over the picture, as a part of what the map shows on average. wrong:
