@@ -29,17 +29,12 @@ from sunsplit.core.files.maps import load
 from sunsplit.core.settings import ConversionSettings
 from tests.benchmarks import equal_error_report
 from tests.benchmarks.large_maps import Kind, make
-from tests.benchmarks.scenes import SCENES
+from tests.benchmarks.scenes import BRIGHTEST, SCENES
 from tests.blender import timed_render
 
 PLAIN, SPLIT = "plain HDRI", "Sunsplit"
 BY_HAND = ("NONE", "256", "512", "1024", "2048", "4096")
 TARGETS = (0.05, 0.02)
-
-BRIGHTEST = {"glossy": 1 / 0.18}
-"""Scenes whose pictures count up to so many of their medians, as on a display that shows these as
-middle grey: a mirrored sun in them, a fiftieth of a pixel wide, is met by one sample in thousands
-and outshines all else."""
 
 TILES = 8
 """Along a picture's side, whose means are taken as independent of each other."""

@@ -19,7 +19,7 @@ import numpy as np
 
 from sunsplit.addon.scene import convert_scene
 from sunsplit.core.settings import ConversionSettings
-from tests.benchmarks.scenes import SCENES
+from tests.benchmarks.scenes import BRIGHTEST, SCENES
 from tests.blender import timed_render
 
 
@@ -55,6 +55,8 @@ def measure(path: Path, scene: str, tolerance: float, options: argparse.Namespac
                 image, took = timed_render(made, Path(name), options.samples, seed)
                 images[way].append(image)
                 seconds[way].append(took)
+    brightest = BRIGHTEST.get(scene, np.inf) * float(np.median(images))
+    images = tuple([np.minimum(image, brightest) for image in one] for one in images)
     noise = [float(np.sqrt(np.var(one, axis=0, ddof=1).mean()) / np.mean(one)) for one in images]
     median = [float(np.median(one)) for one in seconds]
     lamps = len(conversion.suns)
@@ -84,10 +86,10 @@ def main(arguments: Sequence[str] | None = None) -> list[Result]:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("maps", nargs="+", type=Path, metavar="MAP")
     parser.add_argument("-o", "--output", type=Path, default=Path("out"))
-    parser.add_argument("--scenes", nargs="+", choices=SCENES, default=["outdoor", "product"])
+    parser.add_argument("--scenes", nargs="+", choices=SCENES, default=["outdoor", "glossy"])
     parser.add_argument("--tolerances", type=float, nargs="+", default=[1.0, 0.5])
     parser.add_argument("--size", type=int, default=96)
-    parser.add_argument("--samples", type=int, default=24)
+    parser.add_argument("--samples", type=int, default=64)
     parser.add_argument("--repeats", type=int, default=4)
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)

@@ -94,6 +94,12 @@ SCENES: dict[str, Callable[[Path, int], bpy.types.Scene]] = {
 }
 
 
+BRIGHTEST = {"glossy": 1 / 0.18}
+"""Scenes whose pictures count up to so many of their medians, as on a display that shows these as
+middle grey: a mirrored sun in them, a fiftieth of a pixel wide, is met by one sample in thousands
+and outshines all else."""
+
+
 def _under(path: Path) -> tuple[bpy.types.Scene, Matrix]:
     """A scene with the map as its world, and the turn of +X towards the key light."""
     scene = fresh_scene()

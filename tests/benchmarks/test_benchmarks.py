@@ -151,7 +151,7 @@ def test_light_tree(tmp_path, sunrise):
     results = light_tree.main([str(sunrise), *few, "-o", str(tmp_path)])
     assert [one.lamps for one in results] == sorted(one.lamps for one in results)
     assert all(min(*one.noise, *one.seconds) > 0 for one in results)
-    assert "| product |" in (tmp_path / "light_tree.md").read_text()
+    assert "| glossy |" in (tmp_path / "light_tree.md").read_text()
 
 
 @once
