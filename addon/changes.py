@@ -140,7 +140,7 @@ def _is_reshaped(thing: bpy.types.Object) -> bool:
     """Whether its surface may change in itself, or be made anew for each frame."""
     if any(part.type in DEFORMING for part in thing.modifiers) or len(thing.particle_systems):
         return True
-    if any(part.type == "NODES" and not _stand_still(part.node_group) for part in thing.modifiers):
+    if any(part.type == "NODES" and not stand_still(part.node_group) for part in thing.modifiers):
         return True
     if thing.pose and any(bone.constraints for bone in thing.pose.bones):
         return True
@@ -173,8 +173,9 @@ def _is_film(texture: bpy.types.ID) -> bool:
     return bool(image and image.source in ("SEQUENCE", "MOVIE"))
 
 
-def _stand_still(tree: bpy.types.NodeTree | None) -> bool:
-    """Whether nodes of geometry make the same in all frames; their inputs are the object's."""
+def stand_still(tree: bpy.types.NodeTree | None) -> bool:
+    """Whether nodes of geometry make the same in all frames, and give no material; their inputs are
+    the object's."""
     waiting, known = [tree], {None}
     while waiting:
         tree = waiting.pop()

@@ -127,7 +127,7 @@ def _gloss(
     reach: Reach | None, settings: ConversionSettings, light: WorldLight
 ) -> Steps[Gloss | None]:
     """What the picture shows in rough gloss, where that may tell how many lamps it takes."""
-    if reach is None or not settings.shadowed_residual or is_animated(light, ()):
+    if reach is None or not settings.cuts_for_gloss or is_animated(light, ()):
         return None
     return (yield from gloss_steps(reach.sight, light.map_from_world))
 

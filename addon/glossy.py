@@ -17,7 +17,7 @@ from .shaders import SHARP, gloss_of, nodes_of
 from .steps import Steps
 
 PICTURE = 20, 11
-"""Rays through a camera's picture that look for gloss."""
+"""Rays through a camera's picture that look for gloss; frames that are looked at share them."""
 
 MATT = 0.8
 """Roughness from which gloss is as even as if it were none."""
@@ -44,7 +44,7 @@ def gloss_steps(sight: Sight, to_map: NDArray[np.float64]) -> Steps[Gloss | None
     found: list[tuple[Vector, Vector, Layer]] = []
     rays = 0
     for moment in sight.moments:
-        for direction, hit in moment.pictured(*PICTURE):
+        for direction, hit in moment.pictured(*PICTURE, len(sight.moments)):
             rays += 1
             if hit is None:
                 continue
@@ -75,16 +75,17 @@ def layers_of(thing: bpy.types.Object) -> Iterator[Layer]:
         if slot.material and slot.material.node_tree:
             for node in nodes_of(slot.material.node_tree):
                 for name in gloss_of(node):
-                    roughness = _value(node, name, UNTOLD)
-                    if SHARP <= roughness <= MATT:
-                        yield Layer(roughness, _facing(node, name))
+                    layer = Layer(_value(node, name, UNTOLD), _facing(node, name))
+                    if SHARP <= layer.roughness <= MATT and layer.facing > 0:
+                        yield layer
 
 
 def _facing(node: bpy.types.Node, name: str) -> float:
     if name == "Coat Roughness":
         return DIELECTRIC * min(_value(node, "Coat Weight", 1.0), 1.0)
     if node.type != "BSDF_PRINCIPLED":
-        return DIELECTRIC if node.type in ("BSDF_GLASS", "BSDF_REFRACTION") else _colour(node)
+        kinds = {"BSDF_GLASS": DIELECTRIC, "BSDF_REFRACTION": 0.0}
+        return kinds[node.type] if node.type in kinds else _colour(node)
     metal = min(_value(node, "Metallic", 1.0), 1.0)
     level = 2 * _value(node, "Specular IOR Level", 0.5)
     return metal * _colour(node) + (1 - metal) * DIELECTRIC * level

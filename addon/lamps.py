@@ -135,8 +135,8 @@ def _aim(lamp: bpy.types.Object, to_light: NDArray[np.float64]) -> None:
 
 
 def _set_visibility(lamp: bpy.types.Object, world: bpy.types.World, is_met: bool) -> None:
-    """The camera sees the sun in the original map, every other ray in the lamp: once each. is_met:
-    by rays that go on from surfaces, besides being looked for."""
+    """The camera sees the sun in the original map, every other ray in the lamp: once each, but for
+    what `singular` tells. is_met: by rays that go on from surfaces, besides being looked for."""
     lamp.visible_camera = False
     lamp.lightgroup = world.lightgroup
     if not hasattr(world, "cycles"):  # Cycles is switched off

@@ -103,20 +103,36 @@ class Moment:
                 yield
         return False
 
-    def part_of_picture(self, names: Container[str]) -> float:
-        """How much of it shows things of these names, or what one may see them through, by few
-        rays."""
+    def part_of_picture(self, names: Container[str], alone: bool = False) -> float:
+        """How much of it shows things of these names, by few rays; if not alone these, what one may
+        see them through counts as well."""
         hits = [self._nearest(*ray, self.view.far) for ray in _rays(self.view, *COARSE)]
         met = [hit.things for hit in hits if hit]
+        if alone:
+            return sum(any(one.name in names for one in some) for some in met) / len(hits)
         return sum(any(self._may_show(names, one) for one in some) for some in met) / len(hits)
 
     def _may_show(self, names: Container[str], thing: bpy.types.Object) -> bool:
         return thing.name in names or thing.name in self.panes.all or thing.hide_render
 
-    def pictured(self, columns: int, rows: int) -> Iterator[tuple[Vector, Hit | None]]:
-        """Directions of rays through a grid over the picture, and what each meets first."""
-        for start, direction in _rays(self.view, columns, rows):
-            yield direction, self._nearest(start, direction, self.view.far)
+    def pictured(
+        self, columns: int, rows: int, in_turn: int
+    ) -> Iterator[tuple[Vector, Hit | None]]:
+        """Directions of rays through a grid over the picture, and the first surface of each that
+        stops light. in_turn: moments that share the grid."""
+        for ray, (start, direction) in enumerate(_rays(self.view, columns, rows)):
+            if (ray + ray // columns + self.number) % in_turn == 0:
+                yield direction, self._stopped(start, direction)
+
+    def _stopped(self, start: Vector, direction: Vector) -> Hit | None:
+        for _ in range(STEPS):
+            hit = self._nearest(start, direction, self.view.far)
+            if hit is None or not any(
+                thing.hide_render or thing.name in self.panes.all for thing in hit.things
+            ):
+                return hit
+            start = hit.point + direction * max(OFF * hit.distance, 1e-6)
+        return None
 
     def mirrors_world(self, hit: Hit, direction: Vector, normal: Vector) -> bool:
         """Whether a ray that is mirrored where it meets a surface leaves the scene. normal: on the
@@ -193,11 +209,12 @@ class Sight:
                 return True
         return False
 
-    def part_of_picture(self, names: Container[str]) -> Steps[float]:
-        """How much of it shows things of these names, at most in any frame that is looked at."""
+    def part_of_picture(self, names: Container[str], alone: bool = False) -> Steps[float]:
+        """How much of it shows things of these names, at most in any frame that is looked at; see
+        `Moment.part_of_picture`."""
         parts = [0.0]
         for moment in self.moments:
-            parts.append(moment.part_of_picture(names))
+            parts.append(moment.part_of_picture(names, alone))
             yield
         return max(parts)
 

@@ -18,7 +18,7 @@ ALL_LIGHT = 0.999
 """Of all light, in lamps: the rest shows nowhere."""
 
 LEAST_SAID = 0.0005
-"""Of all light: less of it that reaches nothing is not worth a sentence."""
+"""Of all light: less of it that reaches nothing, or is shown wrong, is not worth a sentence."""
 
 
 def headline(count: int, share: float) -> str:
@@ -56,6 +56,9 @@ def made_sentences(conversion: Conversion) -> list[str]:
         lines.append(
             _predicted_indoors(conversion) if conversion.is_indoors else predicted(conversion)
         )
+    if conversion.gloss_error is not None and conversion.gloss_error > LEAST_SAID:
+        text = said("What shines shows that light right within {error:.2%}, by prediction")
+        lines.append(text.format(error=conversion.gloss_error))
     if conversion.residual is not None:
         error = conversion.account.relative_error.max()
         lines.append(said("Account: lamps + world = map within {error:.0e}").format(error=error))

@@ -8,7 +8,7 @@ from . import eevee, passes
 from .lamps import remove_lamps, unlink_lamps
 from .light_groups import remove_groups
 from .portals import remove_portals
-from .rig import guards_of, remove_rig, rig_of, twins_of
+from .rig import GUARD, TWIN, guards_of, remove_rig, rig_of, twins_of
 from .singular import links_of, remove_links
 from .skies import SUNS
 from .world import remove_converted, unconverted
@@ -35,6 +35,8 @@ def restore_scene(scene: bpy.types.Scene) -> None:
     remove_groups(scene.view_layers)
     sky = state.sky
     lamps += [*guards_of(sky), *twins_of(sky)]
+    if collection is not None:  # of a rig that the user has deleted
+        lamps += [t for t in collection.objects if (t.get(GUARD) or t.get(TWIN)) and t not in lamps]
     links = links_of(lamps)
     _forget(state)
     remove_portals(scene)

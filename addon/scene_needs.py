@@ -127,8 +127,8 @@ def needs_steps(
         return needs
     singular = singular_things(scene, ever) if by_map and needs.mirrors else []
     if singular:  # then all wear what their slots say
-        ever, shown = _but(ever, singular), _but(shown, singular)
-        nodes = [node for tree in _trees(scene, ever) for node in nodes_of(tree)]
+        shown = _but(shown, singular)
+        nodes = [node for thing in _but(ever, singular) for node in worn_by(thing)]
     return replace(
         needs,
         mirrors=any(is_sharp(node) for node in nodes),
@@ -150,7 +150,7 @@ def _mirrored_part(shown: Sequence[bpy.types.Object], sight: Sight | None) -> St
     if sight is None:
         return MIRRORED_PART
     sharp = {thing.name for thing in shown if any(map(is_sharp, worn_by(thing)))}
-    return (yield from sight.part_of_picture(sharp))
+    return (yield from sight.part_of_picture(sharp, alone=True))
 
 
 def _but(

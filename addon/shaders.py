@@ -12,9 +12,10 @@ import bpy
 SHARP = 0.25
 """Roughness below which a surface may show single pixels of a wide map."""
 
-EXACT = 0.003
+EXACT, NOT_EXACT = 0.0037, 0.004
 """Roughness up to which Cycles reflects and refracts as if there were none, and says so to the
-world (Is Singular Ray). At .004 it does not."""
+world (Is Singular Ray), and from which it does not: where its squares along and across make more
+than 2e-10."""
 
 BENDS = 0.1
 """From how far off 1 an index of refraction spreads light that goes through rough glass; nearer, it
@@ -61,7 +62,7 @@ def gloss_of(node: bpy.types.Node) -> list[str]:
 def is_exact(node: bpy.types.Node, name: str) -> bool:
     """Whether a layer of `gloss_of` is, to Cycles, an exact mirror or clear glass."""
     socket = node.inputs.get(name)
-    if socket is None or socket.is_linked or socket.default_value > 1.001 * EXACT:
+    if socket is None or socket.is_linked or socket.default_value > EXACT:
         return False
     return getattr(node, "distribution", "") != "ASHIKHMIN_SHIRLEY"  # never, however smooth
 
@@ -69,7 +70,9 @@ def is_exact(node: bpy.types.Node, name: str) -> bool:
 def may_be_exact(node: bpy.types.Node, name: str) -> bool:
     """The same where it cannot be told."""
     socket = node.inputs.get(name)
-    return socket is None or socket.is_linked
+    if socket is None or socket.is_linked:
+        return True
+    return EXACT < socket.default_value < NOT_EXACT
 
 
 def lets_straight_through(node: bpy.types.Node) -> bool:

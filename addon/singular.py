@@ -19,7 +19,7 @@ from .driven import Formula
 from .rig import TWIN, Rig
 from .shaders import gloss_of, is_exact, may_be_exact
 from .trace import TAG
-from .unmet import GIVING, WIDE, has_shape, unmet_width, worn_by
+from .unmet import WIDE, are_worn_as_told, has_shape, unmet_width, worn_by
 
 ALL_BUT, ONLY = "Sunsplit All but Mirrors", "Sunsplit Mirrors"
 """Collections of what lamps are linked to."""
@@ -36,7 +36,7 @@ def singular_things(
     shown: all that renders may show."""
     if any(layer.material_override for layer in scene.view_layers):
         return []
-    if any(made.type in GIVING for thing in shown for made in thing.modifiers):
+    if not are_worn_as_told(shown):
         return []
     found = []
     for thing in filter(has_shape, shown):
@@ -60,7 +60,11 @@ def make_twins(
     lamps = [lamp for lamp in lamps if lamp.data.cycles.use_multiple_importance_sampling]
     if not lamps:
         return []
-    others, these = _linked(ALL_BUT, things, "EXCLUDE"), _linked(ONLY, things, "INCLUDE")
+    # To nothing would mean to everything: if all of these are deleted the rig is still there.
+    others, these = (
+        _linked(ALL_BUT, things, "EXCLUDE"),
+        _linked(ONLY, [*things, rig.sky], "INCLUDE"),
+    )
     twins = []
     for lamp in lamps:
         lamp.light_linking.receiver_collection = others

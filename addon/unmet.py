@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 
 import bpy
 
-from .changes import SHAPELESS
+from .changes import SHAPELESS, stand_still
 from .moments import Sight
 from .shaders import (
     GLOSSY,
@@ -52,8 +52,8 @@ DIFFUSE = {
 }
 """Nodes with a shader that reflect evenly, or nothing themselves."""
 
-GIVING = {"NODES", "BOOLEAN", "PARTICLE_SYSTEM"}
-"""Modifiers that may give a thing materials of others, or show others in its place."""
+GIVING = {"BOOLEAN", "PARTICLE_SYSTEM"}
+"""Modifiers, beside nodes, that may give a thing materials of others, or show others there."""
 
 
 def unmet_steps(
@@ -68,7 +68,7 @@ def unmet_steps(
     if not beside and not any(map(has_shape, shown)):
         return 0.0
     width = min(map(unmet_width, nodes), default=ANY)
-    if width != WIDE or sight is None or not _are_worn_as_told(shown):
+    if width != WIDE or sight is None or not are_worn_as_told(shown):
         return width
     lacquered = {thing.name for thing in shown if any(map(_is_faint, worn_by(thing)))}
     part = yield from sight.part_of_picture(lacquered)
@@ -116,12 +116,15 @@ def _is_faint(node: bpy.types.Node) -> bool:
     return unmet_width(node) == WIDE
 
 
-def _are_worn_as_told(shown: Iterable[bpy.types.Object]) -> bool:
+def are_worn_as_told(shown: Iterable[bpy.types.Object]) -> bool:
     """Whether things wear what their slots say, and nothing that modifiers give them."""
-    return not any(
-        thing.instance_type != "NONE" or any(made.type in GIVING for made in thing.modifiers)
-        for thing in shown
-    )
+    return not any(_may_give(made) for thing in shown for made in thing.modifiers)
+
+
+def _may_give(made: bpy.types.Modifier) -> bool:
+    if made.type == "NODES":  # some give none, as that of Shade Auto Smooth
+        return made.node_group is None or not stand_still(made.node_group)
+    return made.type in GIVING
 
 
 def worn_by(thing: bpy.types.Object) -> Iterable[bpy.types.Node]:

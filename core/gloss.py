@@ -25,6 +25,9 @@ PIECE = np.radians(1.5)
 """Points in a spiral stand for a disc, so far from each other at most. Each is blurred by its own
 width, too: of a roughness of .25 light is seen blurred by 7 degrees."""
 
+AT_ONCE = 32
+"""Points that are told at a time: few enough for a processor's own memory."""
+
 FEWEST, MOST = 16, 1024
 """Of these points."""
 
@@ -60,16 +63,24 @@ class Gloss:
         By GGX with the shadowing of Smith and Schlick's Fresnel (Walter and others, Microfacet
         Models for Refraction through Rough Surfaces, 2007).
         """
-        seen = np.maximum((self.normals * self.to_viewer).sum(axis=1), GRAZING)[:, None]
-        facing = self.normals @ directions.T
-        between = np.sqrt(np.maximum(2 + 2 * (self.to_viewer @ directions.T), GRAZING**2))
+        found = np.empty((len(self.roughness), len(directions)))
+        for start in range(0, len(found), AT_ONCE):
+            some = slice(start, start + AT_ONCE)
+            found[some] = self._shown(some, directions, half_width)
+        return found
+
+    def _shown(self, some: slice, directions: Floats, half_width: Floats) -> Floats:
+        to_viewer, normals = self.to_viewer[some], self.normals[some]
+        seen = np.maximum((normals * to_viewer).sum(axis=1), GRAZING)[:, None]
+        facing = normals @ directions.T
+        between = np.sqrt(np.maximum(2 + 2 * (to_viewer @ directions.T), GRAZING**2))
         half = np.clip((seen + facing) / between, 0, 1)  # cosine between normal and half vector
         # A piece that is 2 w wide spreads half vectors as a surface of so much more does.
-        squared = self.roughness[:, None] ** 4 + half_width**2 / 6
+        squared = self.roughness[some, None] ** 4 + half_width**2 / 6
         facets = squared / (np.pi * (half**2 * (squared - 1) + 1) ** 2)
         lit = np.maximum(facing, GRAZING)
         hidden = 1 + _smith(squared, lit) + _smith(squared, seen)
-        fresnel = self.facing[:, None]
+        fresnel = self.facing[some, None]
         fresnel = fresnel + (1 - fresnel) * np.maximum(1 - between / 2, 0) ** 5
         return np.where(facing > 0, facets * fresnel / (4 * seen * hidden), 0)
 

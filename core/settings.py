@@ -131,6 +131,11 @@ class ConversionSettings:
         return self.method == "edge" and self.chooses_border
 
     @property
+    def cuts_for_gloss(self) -> bool:
+        """Whether cells are cut where rough gloss shows them: discs by "edge", for Cycles."""
+        return self.method == "edge" and self.shape == "disc" and self.shadowed_residual
+
+    @property
     def leaves_residual(self) -> bool:
         """Whether there is a rest to show: not if all light goes to suns."""
         return self.residual != "none" and self.share != 1

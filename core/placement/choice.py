@@ -8,7 +8,6 @@ from math import hypot
 
 import numpy as np
 
-from ..gloss import Gloss
 from ..indoors import Indoors
 from ..patches import MOST_PATCHES, Patches, patches_of
 from ..prediction import Prediction
@@ -16,14 +15,12 @@ from ..region import RegionLight
 from ..settings import ConversionSettings
 from ..strata import Strata
 from ..visible import VisiblePart
-from .edge import edge_suns, suns_of_cells
-from .edge_cells import cells_of
-from .edge_light import EdgeLight
+from .edge import edge_suns
 from .edge_split import split_of
-from .gloss_cuts import cut_for_gloss, owners, shown_light
-from .level import Level, levelled
+from .gloss_cuts import true_in_gloss
+from .judged import judged, tilted
 from .light_count import fewest, first_guess
-from .placement import NO_SUN, ON_GLOSS, ON_GROUND, ON_WALLS, ChosenSuns
+from .placement import NO_SUN, ON_GLOSS, ChosenSuns
 from .sampled import sampled_suns
 
 PER_LIGHT, FEWEST_PATCHES = 128, 2048
@@ -43,16 +40,6 @@ both are good to a tenth only."""
 
 MOST_INDOORS = 64
 """By itself: where little of a light grazes a window, all that comes in of it is an edge."""
-
-MOST_IN_GLOSS = 64
-"""By itself: more are not worth what they cost to show a floor's reflections a little truer."""
-
-ROUNDS = 6
-"""So often are cells cut further, if what tilts their discs for level ground is shown by gloss."""
-
-TILTS_COST = 0.65, 2.6
-"""See `level.levelled`: the median of 191 sets of suns under eight maps, and what nine in ten of
-them do not exceed. That is tried where shadows of tilted discs are more wrong than was thought."""
 
 
 def choose_suns(
@@ -94,9 +81,10 @@ def choose_suns(
         chosen = _as_many_as_help(light, strata, settings, prediction)
     else:
         chosen = _fewest_by_edge(light, strata, settings, prediction, within)
-    if gloss is not None and settings.method == "edge" and settings.shape == "disc":
-        chosen = _mirrored(chosen, light, patches, strata, settings, prediction, gloss, within)
-    notes = (*chosen.notes, *_count_note(chosen, light, settings, prediction, allowed))
+    if gloss is not None and settings.cuts_for_gloss:
+        chosen = true_in_gloss(chosen, light, patches, strata, settings, prediction, gloss, within)
+    notes = _count_note(chosen, light, settings, prediction, allowed)
+    notes = (*chosen.notes, *notes, *_gloss_note(chosen, settings))
     return replace(chosen, notes=notes)
 
 
@@ -108,7 +96,7 @@ def _by_samples(
     allowed: float | None,
 ) -> ChosenSuns:
     def sampled(count: int) -> ChosenSuns:
-        return _judged(sampled_suns(light, strata, settings, count), prediction, strata)
+        return judged(sampled_suns(light, strata, settings, count), prediction, strata)
 
     if allowed is None:
         return sampled(settings.most_lights)
@@ -123,10 +111,10 @@ def _as_many_as_help(
     together can be more than that, or less."""
     count = settings.most_lights
     patches = _patches(light, strata, _for_lights(count, PER_LIGHT, FEWEST_PATCHES))
-    best = _judged(edge_suns(patches, strata, settings, count), prediction, strata)
+    best = judged(edge_suns(patches, strata, settings, count), prediction, strata)
     while 1 < len(best.suns) < count:
         count = len(best.suns) // 2 + 1
-        fewer = _judged(edge_suns(patches, strata, settings, count), prediction, strata)
+        fewer = judged(edge_suns(patches, strata, settings, count), prediction, strata)
         if fewer.predicted_error >= best.predicted_error:
             break
         best = fewer
@@ -163,84 +151,11 @@ def _fewest_by_edge(
         enough = _for_lights(max(count, likely), SEARCHED_PER_LIGHT, FEWEST_SEARCHED)
         patches = _patches(light, strata, enough)
         chosen = edge_suns(patches, strata, settings, count, level=True, rough=rough)
-        return _levelled(_judged(chosen, prediction, strata), prediction, strata, allowed)
+        return tilted(judged(chosen, prediction, strata), prediction, strata, allowed)
 
     quickly, with_care = (partial(of_cells, rough=rough) for rough in (True, False))
     found = fewest(quickly, allowed, most, expected, with_care)
     return min(found, with_care(len(found.suns)), key=lambda one: one.worst)
-
-
-def _mirrored(
-    chosen: ChosenSuns,
-    light: RegionLight,
-    patches: Patches,
-    strata: Strata,
-    settings: ConversionSettings,
-    prediction: Prediction,
-    gloss: Gloss,
-    of_shadows: float | None,
-) -> ChosenSuns:
-    """The same suns, or more where rough gloss shows them to be discs, with what is wrong of that.
-    of_shadows: what is allowed of them; suns are tilted for that, which gloss shows too."""
-    shown = light.latest("gloss", (strata, gloss.key), lambda: shown_light(gloss, patches))
-    wanted = shown.sum(axis=1)
-
-    def told(suns: ChosenSuns) -> ChosenSuns:
-        wrong = gloss.shown_of(suns.suns) - wanted
-        return replace(suns, gloss_error=gloss.error(wrong, strata.light))
-
-    best = told(chosen)
-    aim, most = settings.tolerated / 100, settings.most_lights
-    allowed = ON_GLOSS * aim
-    if settings.lights is None:
-        most = max(min(most, MOST_IN_GLOSS), len(chosen.suns))
-    if best.gloss_error <= allowed or len(chosen.suns) >= most:
-        return best
-    parts, owner = EdgeLight.of(patches, settings.shape), owners(chosen.taken, light, patches)
-    for _ in range(ROUNDS):
-        owner = cut_for_gloss(parts, patches, owner, gloss, shown, strata.light, aim, most)
-        cut = suns_of_cells(cells_of(parts, owner), patches, strata, settings)
-        cut = _judged(replace(cut, notes=chosen.notes), prediction, strata)
-        cut = told(_levelled(cut, prediction, strata, of_shadows) if of_shadows else cut)
-        best = min(best, cut, key=lambda one: one.gloss_error)
-        if cut.gloss_error <= allowed or len(cut.suns) >= most:
-            break
-        aim *= allowed / cut.gloss_error
-    return best
-
-
-def _levelled(
-    chosen: ChosenSuns, prediction: Prediction, strata: Strata, allowed: float
-) -> ChosenSuns:
-    """The same suns, tilted if that helps."""
-    part = prediction.part
-    level = Level(
-        prediction.ground,
-        prediction.standing,
-        on_ground=allowed * ON_GROUND * strata.part_on_ground / part,
-        on_walls=allowed * ON_WALLS / (4 * part),
-        shadows=allowed / part,
-    )
-    best = chosen
-    for costs in TILTS_COST:
-        if best.worst <= allowed or best.worst == chosen.predicted_error:
-            break
-        suns = levelled(chosen.suns, level, chosen.predicted_error / allowed, costs)
-        tilted = _judged(replace(chosen, suns=suns), prediction, strata)
-        best = min(best, tilted, key=lambda one: one.worst)
-        if tilted.predicted_error < tilted.worst:
-            break
-    return best
-
-
-def _judged(chosen: ChosenSuns, prediction: Prediction, strata: Strata) -> ChosenSuns:
-    """The same suns with their predicted errors."""
-    return replace(
-        chosen,
-        predicted_error=prediction.error(chosen.suns),
-        ground_error=prediction.wrong_on_ground(chosen.suns) / strata.part_on_ground,
-        standing_error=prediction.wrong_on_walls(chosen.suns),
-    )
 
 
 def _for_lights(count: int, per_light: int, least: int) -> int:
@@ -284,6 +199,20 @@ def _count_note(
         why = f"region A has only {len(light.pixels)} pixels that shine" if few else _NO_TRUER
         return [f"{made} of {asked} lights: {why}."]
     return []
+
+
+def _gloss_note(chosen: ChosenSuns, settings: ConversionSettings) -> list[str]:
+    """Where more lights would show something truer, and may be had."""
+    if chosen.gloss_error is None or (settings.lights and settings.tolerance is None):
+        return []
+    percent, allowed = 100 * chosen.gloss_error, ON_GLOSS * settings.tolerated
+    if percent <= allowed:
+        return []
+    more = "" if settings.lights else ": set the number of lights for more"
+    return [
+        f"{len(chosen.suns)} lights are predicted to be shown wrong by {percent:.2g} % in rough "
+        f"gloss, which is more than the {allowed:.3g} % allowed{more}."
+    ]
 
 
 _NO_TRUER = "more would cast no truer shadows"

@@ -6,7 +6,7 @@ the worst first, until what is mirrored is right enough.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,10 +14,23 @@ from ..cells import Cells, Taken
 from ..environment import LUMINANCE_WEIGHTS
 from ..gloss import Gloss
 from ..patches import Patches
+from ..prediction import Prediction
 from ..region import RegionLight
+from ..settings import ConversionSettings
 from ..shadow_edges import half_widths
+from ..strata import Strata
 from ..suns import disc_diameter
+from .edge import suns_of_cells
+from .edge_cells import cells_of
 from .edge_light import EdgeLight, Floats, Owner, sums_of
+from .judged import judged, tilted
+from .placement import ON_GLOSS, ChosenSuns
+
+MOST_IN_GLOSS = 64
+"""By itself: more are not worth what they cost to show a floor's reflections a little truer."""
+
+ROUNDS = 6
+"""So often are cells cut further, if what tilts their discs for level ground is shown by gloss."""
 
 
 def shown_light(gloss: Gloss, patches: Patches) -> Floats:
@@ -38,6 +51,50 @@ def owners(taken: Taken, light: RegionLight, patches: Patches) -> Owner:
         near = patches.directions[known] @ patches.directions[patch]
         owner[patch] = owner[known[np.argmax(near)]]
     return owner
+
+
+def true_in_gloss(
+    chosen: ChosenSuns,
+    light: RegionLight,
+    patches: Patches,
+    strata: Strata,
+    settings: ConversionSettings,
+    prediction: Prediction,
+    gloss: Gloss,
+    of_shadows: float | None,
+) -> ChosenSuns:
+    """The same suns, or more where rough gloss shows them to be discs, with what is wrong of that.
+    of_shadows: what is allowed of them; suns are tilted for that, which gloss shows too."""
+    shown = light.latest("gloss", (strata, gloss.key), lambda: shown_light(gloss, patches))
+    wanted = shown.sum(axis=1)
+
+    def told(suns: ChosenSuns) -> ChosenSuns:
+        wrong = gloss.shown_of(suns.suns) - wanted
+        return replace(suns, gloss_error=gloss.error(wrong, strata.light))
+
+    aim, most = settings.tolerated / 100, settings.most_lights
+    allowed = ON_GLOSS * aim
+
+    def badness(suns: ChosenSuns) -> float:
+        shadows = suns.worst / of_shadows if of_shadows else 0.0
+        return max(suns.gloss_error / allowed, shadows)
+
+    best = told(chosen)
+    if settings.lights is None:
+        most = max(min(most, MOST_IN_GLOSS), len(chosen.suns))
+    if best.gloss_error <= allowed or len(chosen.suns) >= most:
+        return best
+    parts, owner = EdgeLight.of(patches, settings.shape), owners(chosen.taken, light, patches)
+    for _ in range(ROUNDS):
+        owner = cut_for_gloss(parts, patches, owner, gloss, shown, strata.light, aim, most)
+        cut = suns_of_cells(cells_of(parts, owner), patches, strata, settings)
+        cut = judged(replace(cut, notes=chosen.notes), prediction, strata)
+        cut = told(tilted(cut, prediction, strata, of_shadows) if of_shadows else cut)
+        best = min(best, cut, key=badness)
+        if cut.gloss_error <= allowed or len(cut.suns) >= most:
+            break
+        aim *= allowed / cut.gloss_error
+    return best
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,7 +48,8 @@ ON_WALLS = 1.0
 
 
 ON_GLOSS = 1.2
-"""And so much of what gloss shows in a picture, which is good to a fifth as predicted."""
+"""So much of a tolerance is allowed of what rough gloss shows in a picture: it is predicted no
+better than to a fifth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +74,9 @@ class ChosenSuns:
 
     @property
     def worst(self) -> float:
-        """What a tolerance is held against."""
-        walls, gloss = self.standing_error or 0.0, self.gloss_error or 0.0
-        return max(
-            self.predicted_error,
-            self.ground_error / ON_GROUND,
-            walls / ON_WALLS,
-            gloss / ON_GLOSS,
-        )
+        """What a tolerance is held against; gloss is held against it by itself."""
+        walls = self.standing_error or 0.0
+        return max(self.predicted_error, self.ground_error / ON_GROUND, walls / ON_WALLS)
 
 
 Place = Callable[[RegionLight, int], Placement]

@@ -9,7 +9,6 @@ from mathutils import Matrix
 
 from sunsplit.addon.rig import twins_of
 from sunsplit.addon.scene_needs import needs_steps
-from sunsplit.addon.shaders import EXACT
 from sunsplit.addon.singular import ALL_BUT, ONLY
 from sunsplit.addon.steps import run_at_once
 from tests.blender import (
@@ -78,10 +77,11 @@ def singular(scene) -> set[str]:
     ("inputs", "exact"),
     [
         ({"Roughness": 0.0, "Metallic": 1.0}, True),
-        ({"Roughness": EXACT, "Transmission_Weight": 1.0}, True),
+        ({"Roughness": 0.0036, "Transmission_Weight": 1.0}, True),
         ({"Roughness": 0.0}, True),  # as glazed tiles are: matt under an exact gloss
         ({"Roughness": 0.5, "Coat_Weight": 1.0, "Coat_Roughness": 0.0}, True),
         ({"Roughness": 0.03, "Metallic": 1.0}, False),
+        ({"Roughness": 0.0038, "Metallic": 1.0}, False),  # too near to tell
         ({"Roughness": 0.5}, False),
         # These have an exact layer, and another that must meet lamps.
         ({"Roughness": 0.0, "Coat_Weight": 1.0, "Coat_Roughness": 0.03}, False),
@@ -206,10 +206,13 @@ def test_lamps_and_their_twins(scene):
         assert linked(twin) == ONLY
         assert not twin.data.cycles.use_multiple_importance_sampling
         assert not twin.visible_camera
-    for name, way in ((ALL_BUT, "EXCLUDE"), (ONLY, "INCLUDE")):
+    for name, way, held in (
+        (ALL_BUT, "EXCLUDE", {mirror}),
+        (ONLY, "INCLUDE", {mirror, state.sky}),
+    ):
         collection = bpy.data.collections[name]
-        assert list(collection.objects) == [mirror]
-        assert collection.collection_objects[0].light_linking.link_state == way
+        assert set(collection.objects) == held
+        assert {one.light_linking.link_state for one in collection.collection_objects} == {way}
     assert "till then they show both" in state.report
 
 
@@ -307,6 +310,69 @@ def test_twins_do_as_their_lamps_do(scene):
     lamp.hide_render = True
     bpy.context.view_layer.update()
     assert evaluated(twin).hide_render
+
+
+def test_without_its_things_a_twin_lights_nothing(scene):
+    """To Blender a lamp that is linked to nothing is linked to all."""
+    mirror = add(scene, chrome())
+    add(scene, brushed())
+    bpy.ops.sunsplit.convert()
+    bpy.data.objects.remove(mirror)
+    for twin in twins_of(scene.sunsplit.sky):
+        assert list(twin.light_linking.receiver_collection.objects) == [scene.sunsplit.sky]
+
+
+def test_twins_of_a_rig_that_is_gone_go_too(scene):
+    add(scene, chrome())
+    add(scene, brushed())
+    before = counts()
+    for redo in (True, False):
+        bpy.ops.sunsplit.convert()
+        after = counts()
+        bpy.data.objects.remove(scene.sunsplit.sky)
+        if redo:
+            bpy.ops.sunsplit.convert()
+            assert counts() == after
+    bpy.ops.sunsplit.restore()
+    assert counts() == before
+
+
+def smooth_by_angle(thing):
+    """As Shade Auto Smooth does it: nodes that give no material."""
+    group = bpy.data.node_groups.new("Smooth", "GeometryNodeTree")
+    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    nodes = [group.nodes.new(f"NodeGroup{end}") for end in ("Input", "Output")]
+    smooth = group.nodes.new("GeometryNodeSetShadeSmooth")
+    group.links.new(nodes[0].outputs[0], smooth.inputs[0])
+    group.links.new(smooth.outputs[0], nodes[1].inputs[0])
+    thing.modifiers.new("Smooth", "NODES").node_group = group
+
+
+def subdivide(thing):
+    thing.modifiers.new("Subdivision", "SUBSURF")
+
+
+@pytest.mark.parametrize("change", [smooth_by_angle, subdivide])
+def test_modifiers_that_give_no_material(scene, change):
+    add(scene, chrome(), "Mirror")
+    change(add(scene, diffuse("Matt", 0.5), "Other"))
+    bpy.context.view_layer.update()
+    found = needs(scene)
+    assert {thing.name for thing in found.singular} == {"Mirror"}
+    assert not found.mirrors
+    assert found.unmet_width == pytest.approx(np.pi)
+
+
+def test_what_is_no_mirror_is_no_part_of_them(scene):
+    skin = material("Skin", (1, 1, 1), Subsurface_Weight=0.2, Roughness=0.5)
+    add_mesh(scene, plate_mesh(9), skin, Matrix.Translation((0, 0, 0.01)))
+    mirror = add(scene, chrome())
+    mirror.location = (-9, 0, 0)  # behind the camera
+    bpy.context.view_layer.update()
+    found = needs(scene)
+    assert found.singular
+    assert found.mirrored_part == 0
 
 
 def test_a_saved_file_can_be_restored(scene, tmp_path):

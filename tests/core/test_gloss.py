@@ -14,10 +14,9 @@ from sunsplit.core.conversion import convert
 from sunsplit.core.environment import LUMINANCE_WEIGHTS
 from sunsplit.core.gloss import Gloss
 from sunsplit.core.patches import patches_of
-from sunsplit.core.placement.choice import MOST_IN_GLOSS
 from sunsplit.core.placement.edge import edge_suns
 from sunsplit.core.placement.edge_light import EdgeLight
-from sunsplit.core.placement.gloss_cuts import cut_for_gloss, owners, shown_light
+from sunsplit.core.placement.gloss_cuts import MOST_IN_GLOSS, cut_for_gloss, owners, shown_light
 from sunsplit.core.placement.placement import ON_GLOSS
 from sunsplit.core.region import light_of_map
 from sunsplit.core.settings import ConversionSettings
@@ -197,6 +196,25 @@ def test_no_more_suns_than_were_asked_for(windows, lights):
 def test_what_gloss_does_not_tell(windows, settings):
     found = convert(windows, settings, visible=seen_through(LOOK))
     assert found.gloss_error is None
+
+
+def test_what_cannot_be_made_true_enough_is_said(windows):
+    close = replace(LOOK, rays=len(LOOK.roughness), facing=np.full(len(LOOK.roughness), 0.6))
+    found = convert(windows, ConversionSettings(), visible=seen_through(close))
+    [note] = [note for note in found.notes if "rough gloss" in note]
+    assert f"{100 * found.gloss_error:.2g} %" in note
+    assert found.predicted_error < 0.01
+    few = ConversionSettings(lights=8)
+    found = convert(windows, few, visible=seen_through(close))
+    assert not any("rough gloss" in note for note in found.notes)  # as many as were asked for
+
+
+def test_a_faint_light_that_is_shown_true_is_not_complained_of():
+    pixels = sky(512, 0.5)
+    pixels[100:118, 200:300] = 3
+    found = convert(environment(pixels), ConversionSettings(), visible=seen_through(LOOK))
+    assert found.gloss_error is not None
+    assert not any("more than" in note for note in found.notes)
 
 
 def test_a_share_that_is_given_is_shown_as_true(windows):
