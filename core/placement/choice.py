@@ -75,17 +75,31 @@ def choose_suns(
     if allowed is not None and settings.tolerance is None:
         allowed = hypot(allowed, 100 * prediction.of_residual)
     within = None if allowed is None else allowed / 100
-    if settings.method != "edge":
-        chosen = _by_samples(light, strata, settings, prediction, within)
-    elif within is None:
-        chosen = _as_many_as_help(light, strata, settings, prediction)
-    else:
-        chosen = _fewest_by_edge(light, strata, settings, prediction, within)
+    # A map that was turned is seen otherwise in gloss, and casts the same shadows.
+    chosen = light.latest(
+        "chosen",
+        (told_for, settings),
+        lambda: _for_shadows(light, strata, settings, prediction, within),
+    )
     if gloss is not None and settings.cuts_for_gloss:
         chosen = true_in_gloss(chosen, light, patches, strata, settings, prediction, gloss, within)
     notes = _count_note(chosen, light, settings, prediction, allowed)
     notes = (*chosen.notes, *notes, *_gloss_note(chosen, settings))
     return replace(chosen, notes=notes)
+
+
+def _for_shadows(
+    light: RegionLight,
+    strata: Strata,
+    settings: ConversionSettings,
+    prediction: Prediction,
+    allowed: float | None,
+) -> ChosenSuns:
+    if settings.method != "edge":
+        return _by_samples(light, strata, settings, prediction, allowed)
+    if allowed is None:
+        return _as_many_as_help(light, strata, settings, prediction)
+    return _fewest_by_edge(light, strata, settings, prediction, allowed)
 
 
 def _by_samples(
