@@ -93,20 +93,7 @@ def skipped_sentences(
         )
         lines.append(text.format(part=conversion.invisible_part))
     if settings.residual_width is None and width is not None and width < own:
-        coarse = said(
-            "Skipped: the camera is too coarse for more, so the world that lights is {width} "
-            "pixels wide instead of {own}."
-        )
-        rough = said(
-            "Skipped: nothing mirrors sharply, so the world that lights is {width} pixels wide "
-            "instead of {own}."
-        )
-        apart = said(
-            "Skipped: nothing mirrors it sharply, so the world that lights is {width} pixels wide "
-            "instead of {own}."
-        )
-        smooth = apart if needs.singular else rough
-        lines.append((coarse if needs.mirrors else smooth).format(width=width, own=own))
+        lines.append(_lights_narrower(needs).format(width=width, own=own))
     if not (conversion.settings.mirrors or conversion.account.share < ALL_LIGHT):
         lines.append(
             said(
@@ -114,21 +101,12 @@ def skipped_sentences(
                 "only the camera sees the world."
             )
         )
-    shown = needs.shown_width(own)
     if not needs.shows_map:
         lines.append(
             said("Skipped: the camera does not see the world, so renders do not load the HDRI.")
         )
-    elif shown != own:
-        text = said(
-            "Skipped: at this resolution the camera shows no more than {shown} pixels around, so "
-            "it gets a map that wide instead of {own}."
-        )
-        both = said(
-            "Skipped: at this resolution camera and mirrors show no more than {shown} pixels "
-            "around, so they get a map that wide instead of {own}."
-        )
-        lines.append((both if needs.singular else text).format(shown=shown, own=own))
+    elif needs.shown_width(own) != own:
+        lines.append(_shown_narrower(needs).format(shown=needs.shown_width(own), own=own))
     if any(sun.angular_diameter <= needs.unmet_width for sun in conversion.suns):
         alone = said(
             "Skipped: nothing mirrors sharply, so rays need not meet lamps by chance. If you "
@@ -142,6 +120,37 @@ def skipped_sentences(
     if tree_off:
         lines.append(said("Skipped: the light tree, as it would take longer than it saves."))
     return lines
+
+
+def _lights_narrower(needs: SceneNeeds) -> str:
+    """With places for the width of the world that lights, and of the map's own."""
+    if needs.mirrors:
+        return said(
+            "Skipped: the camera is too coarse for more, so the world that lights is {width} "
+            "pixels wide instead of {own}."
+        )
+    if needs.singular:  # which show the map itself
+        return said(
+            "Skipped: nothing mirrors it sharply, so the world that lights is {width} pixels wide "
+            "instead of {own}."
+        )
+    return said(
+        "Skipped: nothing mirrors sharply, so the world that lights is {width} pixels wide "
+        "instead of {own}."
+    )
+
+
+def _shown_narrower(needs: SceneNeeds) -> str:
+    """With places for the width of what is shown, and of the map's own."""
+    if needs.singular:
+        return said(
+            "Skipped: at this resolution camera and mirrors show no more than {shown} pixels "
+            "around, so they get a map that wide instead of {own}."
+        )
+    return said(
+        "Skipped: at this resolution the camera shows no more than {shown} pixels around, so "
+        "it gets a map that wide instead of {own}."
+    )
 
 
 def mirror_sentences(needs: SceneNeeds, twins: int) -> list[str]:

@@ -95,26 +95,17 @@ def _for_shadows(
     prediction: Prediction,
     allowed: float | None,
 ) -> ChosenSuns:
-    if settings.method != "edge":
-        return _by_samples(light, strata, settings, prediction, allowed)
-    if allowed is None:
-        return _as_many_as_help(light, strata, settings, prediction)
-    return _fewest_by_edge(light, strata, settings, prediction, allowed)
+    """By any method, as many as were asked for, or about as few as are allowed to be wrong."""
 
-
-def _by_samples(
-    light: RegionLight,
-    strata: Strata,
-    settings: ConversionSettings,
-    prediction: Prediction,
-    allowed: float | None,
-) -> ChosenSuns:
     def sampled(count: int) -> ChosenSuns:
         return judged(sampled_suns(light, strata, settings, count), prediction, strata)
 
+    most = settings.most_lights
+    if settings.method != "edge":
+        return sampled(most) if allowed is None else fewest(sampled, allowed, most)
     if allowed is None:
-        return sampled(settings.most_lights)
-    return fewest(sampled, allowed, settings.most_lights)
+        return _as_many_as_help(light, strata, settings, prediction)
+    return _fewest_by_edge(light, strata, settings, prediction, allowed)
 
 
 def _as_many_as_help(

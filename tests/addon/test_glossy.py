@@ -8,8 +8,11 @@ import pytest
 from mathutils import Matrix
 
 from sunsplit.addon.glossy import PICTURE, gloss_steps, layers_of
+from sunsplit.addon.scene import convert_scene
 from sunsplit.addon.scene_needs import needs_of
 from sunsplit.addon.steps import run_at_once
+from sunsplit.core.placement.placement import ON_GLOSS
+from sunsplit.core.settings import ConversionSettings
 from tests.blender import (
     add_mesh,
     box_mesh,
@@ -152,11 +155,11 @@ def test_a_matt_scene_shows_nothing(scene):
     assert gloss(scene) is None
 
 
-def test_lamps_are_split_for_a_floor(scene):
-    """Under a sunrise few are needed, and said to be true."""
-    add_floor(scene)
+def test_a_floor_is_asked_what_it_shows_of_the_lamps(scene):
+    """What that is like in a picture: tests/render/test_mirrors.py."""
+    floor = add_floor(scene)
     bpy.context.view_layer.update()
-    bpy.ops.sunsplit.convert()
-    lamps = len(scene.sunsplit.lamps)
-    assert 0 < lamps <= 64
-    assert "rough gloss, which is more" not in scene.sunsplit.report
+    shining = convert_scene(scene, ConversionSettings()).conversion
+    assert 0 < shining.gloss_error <= 0.01 * ON_GLOSS
+    floor.data.materials[0] = diffuse("Matt", 0.2)
+    assert convert_scene(scene, ConversionSettings()).conversion.gloss_error is None
